@@ -1,0 +1,126 @@
+"""``@kernel``: compile a per-sample formula with numba, or run the same source as plain Python.
+
+A kernel is written on scalars and tuples only: no arrays inside, no ``@``, no fastmath, so that the
+compiled result equals the plain one bit for bit. :func:`kernel` is for the small formulas, one per
+equation; :func:`entry_kernel` for the loop that Python calls, whose machine code is kept on disk.
+
+numba's own disk cache looks at the file of the outermost function only: an edited constant or
+callee in a sibling file would give the OLD result silently. The cache here lives in a folder named
+by a digest of every Python source of the package, so it can never be stale; where no folder can
+be written, the code is compiled in memory.
+
+``NUMBA_DISABLE_JIT=1`` runs everything as plain Python; without numba at all that is what happens,
+with one warning.
+"""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import os
+import sys
+import warnings
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, TypeVar
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+try:
+    import numba as _numba
+
+    numba: Any = _numba
+except ImportError:
+    numba = None
+    warnings.warn(
+        "numba cannot be imported: vehnav integrates as plain Python, about 180 times slower",
+        RuntimeWarning,
+        stacklevel=2,
+    )
+
+
+def source_digest(root: Path | None = None) -> str:
+    """Hexadecimal digest of every Python source of the package (names and contents)."""
+    root = root or Path(__file__).parent
+    digest = hashlib.sha256(sys.version.encode())
+    for path in sorted(root.rglob("*.py")):
+        digest.update(str(path.relative_to(root)).encode())
+        digest.update(path.read_bytes())
+    return digest.hexdigest()[:20]
+
+
+def cache_root() -> Path:
+    """The folder that holds compiled kernels: ``VEHNAV_CACHE_DIR`` or the user's cache folder."""
+    if set_by_user := os.environ.get("VEHNAV_CACHE_DIR"):
+        return Path(set_by_user)
+    if sys.platform == "win32":
+        base = Path(os.environ.get("LOCALAPPDATA", Path.home() / "AppData/Local"))
+    elif sys.platform == "darwin":
+        base = Path.home() / "Library/Caches"
+    else:
+        base = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+    return base / "vehnav"
+
+
+@functools.cache
+def _cache_folder() -> Path | None:
+    """A writable folder for this very source, or None."""
+    try:
+        folder = cache_root() / f"kernels-{source_digest()}"
+        folder.mkdir(parents=True, exist_ok=True)
+        probe = folder / f".probe-{os.getpid()}"
+        probe.touch()
+        probe.unlink()
+    except (OSError, RuntimeError):  # RuntimeError: no home folder
+        return None
+    return folder
+
+
+def kernel(func: F) -> F:
+    """Compile one formula; inlined by the compiler into the loop that calls it."""
+    if numba is None:
+        return func
+    compiled: F = numba.njit(func, nogil=True)
+    return compiled
+
+
+def entry_kernel(func: F) -> F:
+    """Compile a loop over samples that Python calls; its machine code is cached on disk."""
+    if numba is None or numba.config.DISABLE_JIT:
+        return func
+    dispatcher = numba.njit(func, nogil=True)
+    if _cache_folder() is not None:
+        dispatcher._cache = _digest_cache(func)
+    compiled: F = dispatcher
+    return compiled
+
+
+def _digest_cache(func: Callable[..., Any]) -> Any:
+    """The function cache of numba, looking in the folder of :func:`source_digest`."""
+    from numba.core import caching as numba_caching
+
+    caching: Any = numba_caching
+
+    class Locator(caching._CacheLocator):
+        """Where the machine code lies: the digest is in the path, so the stamp can be constant."""
+
+        def get_cache_path(self) -> str:
+            return str(_cache_folder())
+
+        def get_source_stamp(self) -> str:
+            return "digest-in-path"
+
+        def get_disambiguator(self) -> str:
+            return str(func.__code__.co_firstlineno)
+
+        @classmethod
+        def from_function(cls, py_func: Any, py_file: str) -> Locator:
+            return cls()
+
+    class Impl(caching.CompileResultCacheImpl):
+        _locator_classes = (Locator,)
+
+    class DigestCache(caching.FunctionCache):
+        _impl_class = Impl
+
+    return DigestCache(func)

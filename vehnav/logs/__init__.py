@@ -1,0 +1,1 @@
+"""A recording becomes arrays: bytes in, :class:`~vehnav.logs.log.Log` out."""

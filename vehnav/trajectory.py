@@ -1,0 +1,108 @@
+"""A trajectory: where the vehicle was, how fast, how turned, and how sure that is."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from vehnav.earth import WGS84, Ellipsoid, local_enu
+from vehnav.units import NS
+
+Array = npt.NDArray[np.float64]
+TimeArray = npt.NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """States at n instants, in the local East-North-Up frame.
+
+    Attributes
+    ----------
+    t_ns : (n,) int64
+        Strictly increasing nanoseconds on the clock of the log.
+    lat, lon, height : (n,)
+        Geodetic, rad, rad, m.
+    v_n : (n, 3)
+        East, north, up velocity relative to the Earth, m/s.
+    c_nb : (n, 3, 3)
+        Direction cosines, body (right-forward-up) to ENU.
+    stopped : (n,) bool
+        Inside a detected stop.
+    sigma_pos : (n, 3) or None
+        Standard deviations east, north, up, m.
+    sigma_heading : (n,) or None
+        Standard deviation of the heading, rad.
+    """
+
+    t_ns: TimeArray
+    lat: Array
+    lon: Array
+    height: Array
+    v_n: Array
+    c_nb: Array
+    stopped: npt.NDArray[np.bool_]
+    sigma_pos: Array | None = None
+    sigma_heading: Array | None = None
+
+    @property
+    def size(self) -> int:
+        """Number of states."""
+        return int(self.t_ns.size)
+
+    def rows(self, index: slice | npt.NDArray[np.int64] | npt.NDArray[np.bool_]) -> Trajectory:
+        """The trajectory of some of the instants."""
+        return replace(
+            self,
+            t_ns=self.t_ns[index],
+            lat=self.lat[index],
+            lon=self.lon[index],
+            height=self.height[index],
+            v_n=self.v_n[index],
+            c_nb=self.c_nb[index],
+            stopped=self.stopped[index],
+            sigma_pos=None if self.sigma_pos is None else self.sigma_pos[index],
+            sigma_heading=None if self.sigma_heading is None else self.sigma_heading[index],
+        )
+
+    def enu(self, origin: tuple[float, float, float], *, earth: Ellipsoid = WGS84) -> Array:
+        """(n, 3) m: positions in the tangent plane at ``origin`` (lat rad, lon rad, height m)."""
+        return local_enu(self.lat, self.lon, self.height, origin=origin, earth=earth)
+
+    def path_length(self) -> float:
+        """Horizontal distance driven, m: the integral of the horizontal speed (trapezoid)."""
+        speed = np.hypot(self.v_n[:, 0], self.v_n[:, 1])
+        dt = np.diff(self.t_ns) * NS
+        return float(np.sum(0.5 * (speed[1:] + speed[:-1]) * dt))
+
+
+def interpolate_positions(trajectory: Trajectory, t_ns: TimeArray) -> tuple[Array, Array, Array]:
+    """(lat, lon, height) at instants inside the span of the trajectory.
+
+    Cubic Hermite between the neighbouring states with their velocities, so that nothing is lost
+    at 1 Hz output either. ValueError outside the span.
+    """
+    if t_ns.size and (t_ns[0] < trajectory.t_ns[0] or t_ns[-1] > trajectory.t_ns[-1]):
+        raise ValueError("interpolation outside the span of the trajectory")
+    k = np.clip(np.searchsorted(trajectory.t_ns, t_ns, side="right") - 1, 0, trajectory.size - 2)
+    h = (trajectory.t_ns[k + 1] - trajectory.t_ns[k]) * NS
+    s = (t_ns - trajectory.t_ns[k]) * NS / h
+    lat0 = trajectory.lat[k]
+    r_n = WGS84.a / np.sqrt(1.0 - WGS84.e2 * np.sin(lat0) ** 2)
+    r_m = r_n * (1.0 - WGS84.e2) / (1.0 - WGS84.e2 * np.sin(lat0) ** 2)
+    v0, v1 = trajectory.v_n[k], trajectory.v_n[k + 1]
+    h00, h10 = (1.0 + 2.0 * s) * (1.0 - s) ** 2, s * (1.0 - s) ** 2
+    h01, h11 = s * s * (3.0 - 2.0 * s), s * s * (s - 1.0)
+
+    def hermite(x: Array, d0: Array, d1: Array) -> Array:
+        return np.asarray(h00 * x[k] + h10 * h * d0 + h01 * x[k + 1] + h11 * h * d1)
+
+    r_lat = r_m + trajectory.height[k]
+    r_lon = (r_n + trajectory.height[k]) * np.cos(lat0)
+    lon = np.unwrap(trajectory.lon) if trajectory.size else trajectory.lon
+    return (
+        hermite(trajectory.lat, v0[:, 1] / r_lat, v1[:, 1] / r_lat),
+        np.remainder(hermite(lon, v0[:, 0] / r_lon, v1[:, 0] / r_lon) + np.pi, 2 * np.pi) - np.pi,
+        hermite(trajectory.height, v0[:, 2], v1[:, 2]),
+    )
