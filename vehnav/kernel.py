@@ -101,7 +101,7 @@ def _digest_cache(func: Callable[..., Any]) -> Any:
 
     caching: Any = numba_caching
 
-    class Locator(caching._CacheLocator):
+    class Locator(caching._CacheLocator):  # type: ignore[misc]
         """Where the machine code lies: the digest is in the path, so the stamp can be constant."""
 
         def get_cache_path(self) -> str:
@@ -117,10 +117,10 @@ def _digest_cache(func: Callable[..., Any]) -> Any:
         def from_function(cls, py_func: Any, py_file: str) -> Locator:
             return cls()
 
-    class Impl(caching.CompileResultCacheImpl):
+    class Impl(caching.CompileResultCacheImpl):  # type: ignore[misc]
         _locator_classes = (Locator,)
 
-    class DigestCache(caching.FunctionCache):
+    class DigestCache(caching.FunctionCache):  # type: ignore[misc]
         _impl_class = Impl
 
     return DigestCache(func)

@@ -183,3 +183,39 @@ class Log:
             if record is not None and record.t_ns.size:
                 return int(record.t_ns[0])
         return 0
+
+
+@dataclass(frozen=True)
+class ReadOptions:
+    """How to read a recording; every field has the meaning of the option of the same name.
+
+    Attributes
+    ----------
+    imu_topic, gps_topic, speed_topic : str or None
+        Choose a topic; None: found by type.
+    time : {"header", "log"} or None
+        Which stamps count; None: header stamps where they are sound, else log time.
+    columns : mapping of str to str
+        For CSV: quantity -> column name, e.g. ``{"time_s": "t", "gyro_x": "wx"}``.
+    preset : str or None
+        Name of a CSV preset.
+    gyro_unit, accel_unit : str or None
+        Keys of :data:`vehnav.units.GYRO_UNITS`, :data:`~vehnav.units.ACCEL_UNITS`; None: as the
+        format declares.
+    gps_file, speed_file : str or None
+        GPS or speed kept beside the recording.
+    gps_time_offset : float
+        s, added to the stamps of the GPS.
+    """
+
+    imu_topic: str | None = None
+    gps_topic: str | None = None
+    speed_topic: str | None = None
+    time: Literal["header", "log"] | None = None
+    columns: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
+    preset: str | None = None
+    gyro_unit: str | None = None
+    accel_unit: str | None = None
+    gps_file: str | None = None
+    speed_file: str | None = None
+    gps_time_offset: float = 0.0
