@@ -1,0 +1,1 @@
+"""Strapdown integration: increments from samples, then the mechanizations of the papers."""
