@@ -1,0 +1,1 @@
+"""Trajectories and logs to files: one table of formats; every file is written, then renamed."""
