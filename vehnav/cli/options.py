@@ -8,6 +8,7 @@
 from __future__ import annotations
 
 import functools
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -130,6 +131,19 @@ class PairsType(ParamType):
         return pairs
 
 
+class NumberType(click.FloatRange):
+    """A finite number in a range."""
+
+    name = "number"
+
+    def convert(self, value: Any, param: Any, ctx: Any) -> Any:
+        """Refuse nan and inf, which ``float`` would take."""
+        number = super().convert(value, param, ctx)
+        if not math.isfinite(number):
+            self.fail(f"{value!r} is not a finite number", param, ctx)
+        return number
+
+
 class NumbersType(ParamType):
     """A fixed count of numbers: ``1.5,0,-90``; an array in a config file."""
 
@@ -201,7 +215,7 @@ _READ_OPTIONS: list[Callable[[Any], Any]] = [
     option(
         "input",
         "--gps-time-offset",
-        type=float,
+        type=NumberType(),
         default=0.0,
         show_default=True,
         metavar="S",
@@ -260,7 +274,7 @@ def span_options(func: F) -> F:
                 help="End here: seconds from the start of the log, or an ISO time.",
             ),
             option(
-                "input", "--max-gap", type=click.FloatRange(min=0), default=0.5, metavar="S",
+                "input", "--max-gap", type=NumberType(min=0), default=0.5, metavar="S",
                 show_default=True, help="Longest hole in the IMU that is bridged by its edges.",
             ),
         ],
@@ -299,7 +313,7 @@ def stops_options(func: F) -> F:
     return _apply(
         [
             option(
-                "stops", "--stop-threshold", type=click.FloatRange(min=0, min_open=True),
+                "stops", "--stop-threshold", type=NumberType(min=0, min_open=True),
                 metavar="DEG_S",
                 help="Angular rate under which the vehicle stands, deg/s.  "
                 "[default: of the sensor file, else built in]",
@@ -309,11 +323,11 @@ def stops_options(func: F) -> F:
                 help="slow: vehnav's rule; rms: the statistic of the paper.  [default: slow]",
             ),
             option(
-                "stops", "--stop-window", type=click.FloatRange(min=0, min_open=True), metavar="S",
+                "stops", "--stop-window", type=NumberType(min=0, min_open=True), metavar="S",
                 help="Window of the statistic, s.  [default: built in]",
             ),
             option(
-                "stops", "--stop-dwell", type=click.FloatRange(min=0), metavar="S",
+                "stops", "--stop-dwell", type=NumberType(min=0), metavar="S",
                 help="Shortest stop, s.  [default: built in]",
             ),
         ],

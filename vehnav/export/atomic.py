@@ -14,7 +14,8 @@ def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
     """A name beside ``path`` to write to; renamed to ``path`` at the end, removed after an error.
 
     The suffix is kept (writers choose the format by it) and a link is followed (the file it points
-    to is replaced, not the link). A device or a pipe is written directly. OSError where the folder does not exist or cannot be written.
+    to is replaced, not the link). A device or a pipe is written directly. OSError where the folder
+    does not exist or cannot be written.
 
     >>> import tempfile
     >>> folder = Path(tempfile.mkdtemp())
