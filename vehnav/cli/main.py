@@ -14,7 +14,7 @@ import importlib.util
 import os
 import sys
 import traceback
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 import click
@@ -37,6 +37,10 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "convert": ("vehnav.cli.convert:convert", "One format of trajectory or log to another."),
 }
 """Name -> (module:object, short help). A row is listed when its module exists."""
+
+
+class OutputClosed(Exception):
+    """The reader of stdout went away."""
 
 
 class LazyGroup(click.Group):
@@ -74,6 +78,16 @@ class LazyGroup(click.Group):
         if rows:
             with formatter.section("Commands"):
                 formatter.write_dl(rows)
+
+    def make_context(self, *args: Any, **kwargs: Any) -> click.Context:
+        """Parse; ``--help`` and ``--version`` print here."""
+        with _closed_output():
+            return super().make_context(*args, **kwargs)
+
+    def invoke(self, ctx: click.Context) -> Any:
+        """Run the command."""
+        with _closed_output():
+            return super().invoke(ctx)
 
     def main(
         self,
@@ -116,11 +130,7 @@ def status_of(work: Callable[[], Any]) -> int:
         return _say(f"error: {error.format_message()}", UNUSABLE)
     except VehnavError as error:
         return _say(f"error: {error}", UNUSABLE)
-    except SystemExit as leaving:
-        if isinstance(leaving.__context__, BrokenPipeError):  # click caught it and left with 1
-            return _broken_pipe()
-        return leaving.code if isinstance(leaving.code, int) else OK
-    except BrokenPipeError:
+    except (OutputClosed, BrokenPipeError):
         return _broken_pipe()
     except OSError as error:
         if error.filename is None:
@@ -133,6 +143,15 @@ def status_of(work: Callable[[], Any]) -> int:
 def _say(text: str, status: int) -> int:
     click.echo(f"vehnav: {text}", err=True)
     return status
+
+
+@contextlib.contextmanager
+def _closed_output() -> Iterator[None]:
+    """Keep a broken pipe from click, which would leave with 1."""
+    try:
+        yield
+    except BrokenPipeError as error:
+        raise OutputClosed from error
 
 
 def _broken_pipe() -> int:
@@ -159,6 +178,7 @@ def _bug() -> int:
 
 
 @click.group(
+    "vehnav",
     cls=LazyGroup,
     no_args_is_help=False,
     invoke_without_command=True,
