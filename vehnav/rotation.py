@@ -212,3 +212,20 @@ def quaternion_from_c(c: npt.ArrayLike) -> Array:
     q = np.take_along_axis(rows, best, axis=-2)[..., 0, :]
     q = q / np.linalg.norm(q, axis=-1, keepdims=True)
     return np.asarray(np.where(q[..., :1] < 0.0, -q, q))
+
+
+def c_from_quaternion(q: npt.ArrayLike) -> Array:
+    """Rotation matrix (..., 3, 3) of quaternions (..., 4) as (w, x, y, z); normalised first.
+
+    >>> c_from_quaternion([0.0, 0.0, 0.0, 2.0]).tolist()
+    [[-1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, 1.0]]
+    """
+    q = np.asarray(q, float)
+    q = q / np.linalg.norm(q, axis=-1, keepdims=True)
+    w, x, y, z = (q[..., k] for k in range(4))
+    rows = [
+        [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
+        [2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)],
+        [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)],
+    ]
+    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)

@@ -1,0 +1,8 @@
+"""Trajectory against GPS or truth: matching, error series, statistics."""
+
+from __future__ import annotations
+
+from vehnav.evaluation.errors import Errors, compare
+from vehnav.evaluation.statistics import Statistics, statistics
+
+__all__ = ["Errors", "Statistics", "compare", "statistics"]
