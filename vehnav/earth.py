@@ -62,7 +62,7 @@ KRASOVSKY: Final = Ellipsoid(
     gamma_p=9.832,
     omega_ie=7.292116e-5,
     f=1.0 / 298.3,
-    m=0.0034492,
+    m=0.0034500,
 )
 """As paper 004 prints it: rounded e2 and gravity; the paper takes gravity at h = 0."""
 ELLIPSOIDS: Final = {"wgs84": WGS84, "krasovsky": KRASOVSKY}
