@@ -7,7 +7,8 @@ equation; :func:`entry_kernel` for the loop that Python calls, whose machine cod
 numba's own disk cache looks at the file of the outermost function only: an edited constant or
 callee in a sibling file would give the OLD result silently. The cache here lives in a folder named
 by a digest of every Python source of the package, so it can never be stale; where no folder can
-be written, the code is compiled in memory.
+be written, the code is compiled in memory. Folders of older sources are removed, but for the
+newest few.
 
 ``NUMBA_DISABLE_JIT=1`` runs everything as plain Python; without numba at all that is what happens,
 with one warning.
@@ -18,6 +19,7 @@ from __future__ import annotations
 import functools
 import hashlib
 import os
+import shutil
 import sys
 import warnings
 from collections.abc import Callable
@@ -25,6 +27,9 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 F = TypeVar("F", bound=Callable[..., Any])
+
+KEPT_FOLDERS = 4
+"""Compiled kernels of this many sources stay on disk (a few versions or checkouts side by side)."""
 
 try:
     import numba as _numba
@@ -67,13 +72,29 @@ def _cache_folder() -> Path | None:
     """A writable folder for this very source, or None."""
     try:
         folder = cache_root() / f"kernels-{source_digest()}"
-        folder.mkdir(parents=True, exist_ok=True)
+        if not folder.is_dir():
+            folder.mkdir(parents=True, exist_ok=True)
+            _prune(folder)
         probe = folder / f".probe-{os.getpid()}"
         probe.touch()
         probe.unlink()
     except (OSError, RuntimeError):  # RuntimeError: no home folder
         return None
     return folder
+
+
+def _prune(current: Path) -> None:
+    """Remove the folders of older sources, the least recently used first."""
+
+    def used(folder: Path) -> float:
+        try:
+            return folder.stat().st_mtime
+        except OSError:  # another process removed it
+            return 0.0
+
+    others = [folder for folder in current.parent.glob("kernels-*") if folder != current]
+    for folder in sorted(others, key=used, reverse=True)[KEPT_FOLDERS - 1 :]:
+        shutil.rmtree(folder, ignore_errors=True)
 
 
 def kernel(func: F) -> F:
