@@ -15,7 +15,7 @@ LONGEST_MODULE = 400
 LONGEST_FUNCTION = 60
 PHYSICS = {
     "strapdown", "aiding", "stops", "alignment", "corrections", "mounting", "rest", "earth",
-    "rotation",
+    "rotation", "legs", "classic", "offline",
 }  # fmt: skip
 INDEPENDENT_OF_THE_SIMULATOR = {"strapdown", "corrections", "alignment", "stops", "aiding"}
 
