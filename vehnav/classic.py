@@ -1,0 +1,291 @@
+"""Dead reckoning with stops (paper 002): level, gyro bias and heading once, at the start; then
+Poisson integration with levelling and velocity reset at every stop; and the gyro bias that every
+stop shows. What the same stops give offline is in :mod:`vehnav.offline`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from vehnav.alignment import Rest, gyro_bias, mean_over_rest, track_random_walk
+from vehnav.earth import Ellipsoid
+from vehnav.legs import LegNoise
+from vehnav.rest import white_noise
+from vehnav.rotation import angles_from_c_nb, c_nb_from_angles
+from vehnav.stops import Stop, stop_numbers
+from vehnav.strapdown.enu import Solution, StopControl, mechanize_enu
+from vehnav.strapdown.increments import Increments
+
+Array = npt.NDArray[np.float64]
+
+SETTLE = 1.0
+"""s after the start of a stop until levelling begins: suspension rocking decays (spec A 4.2)."""
+GUARD = 0.3
+"""s before the end of a stop at which levelling ends: 0.5 s of levelling under way cost 38 m a
+minute later (spec A 4.3)."""
+MEAN_OFFSET = 0.5
+"""s in the gain 1/(t + 0.5 s): the running mean since levelling began (spec A 4.3, spec C 3)."""
+
+
+@dataclass(frozen=True)
+class Drive:
+    """What the stop methods work on.
+
+    Attributes
+    ----------
+    t : (n,)
+        s since the start of the log.
+    omega, f : (n, 3)
+        Angular rate and specific force in body axes; rates, also where the log has increments.
+    increments : Increments
+        Over the n-1 steps.
+    stops : list of Stop
+    earth : Ellipsoid
+    vertical : str
+        ``clamp`` or ``free``.
+    levelling_rate : float or None
+        k g, 1/s; None: the running mean.
+    """
+
+    t: Array
+    omega: Array
+    f: Array
+    increments: Increments
+    stops: list[Stop]
+    earth: Ellipsoid
+    vertical: str = "clamp"
+    levelling_rate: float | None = None
+
+    @property
+    def first(self) -> int:
+        """Index of the instant where the solution starts."""
+        return self.stops[0].first if self.stops else 0
+
+
+@dataclass(frozen=True)
+class Start:
+    """Where and how the drive starts, at ``Drive.first``.
+
+    Attributes
+    ----------
+    position : (lat rad, lon rad, h m)
+    c_nb : (3, 3)
+    gyro_bias : (3,)
+        rad/s, body axes.
+    accel_scale : float
+        Factor on the specific force.
+    v_n : (east, north, up)
+        m/s, zero at a stop.
+    """
+
+    position: tuple[float, float, float]
+    c_nb: Array
+    gyro_bias: Array
+    accel_scale: float
+    v_n: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+    def turned(self, drive: Drive, heading: float) -> Start:
+        """With another heading, rad; the gyro bias at the first stop follows (Earth rate)."""
+        _, pitch, roll = (float(x) for x in angles_from_c_nb(self.c_nb))
+        c_nb = c_nb_from_angles(heading, pitch, roll)
+        if not drive.stops:
+            return replace(self, c_nb=c_nb)
+        rest = rest_of(drive, drive.stops[0])
+        bias = gyro_bias(rest, c_nb, self.position[0], earth=drive.earth)
+        return replace(self, c_nb=c_nb, gyro_bias=bias)
+
+
+@dataclass(frozen=True)
+class Corrections:
+    """Which procedures are on.
+
+    Attributes
+    ----------
+    levelling, reset : bool
+        Procedures 1 and 2 of paper 002.
+    refine : bool
+        The gyro bias of every stop, and the distribution over the legs.
+    causal : bool
+        Only what was known at the time: the bias of stops so far, no distribution, nothing before
+        the first stop.
+    """
+
+    levelling: bool = True
+    reset: bool = True
+    refine: bool = True
+    causal: bool = False
+
+
+@dataclass(frozen=True)
+class StopRecord:
+    """What a stop showed and what was done.
+
+    Attributes
+    ----------
+    speed_before_reset : float
+        m/s, horizontal, of the dead-reckoned velocity on its first instant.
+    tilt_corrected : float
+        rad, that levelling turned the platform.
+    gyro_bias : (3,)
+        rad/s, seen in this stop alone.
+    """
+
+    speed_before_reset: float
+    tilt_corrected: float
+    gyro_bias: Array
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """A solution over the instants ``first`` ... of the drive.
+
+    Attributes
+    ----------
+    first : int
+        Index of the first instant that has a solution.
+    position, v_n, c_nb : (m, 3), (m, 3), (m, 3, 3)
+        lat rad, lon rad, h m; m/s; body to ENU.
+    records : list of StopRecord
+    sigma_pos : (m, 3) or None
+        East, north, up, m (up is nan where the height is clamped).
+    sigma_heading : (m,) or None
+        rad
+    accel_bias : (3,) or None
+        m/s2, body, beyond the scale; where the legs show it.
+    """
+
+    first: int
+    position: Array
+    v_n: Array
+    c_nb: Array
+    records: list[StopRecord]
+    sigma_pos: Array | None = None
+    sigma_heading: Array | None = None
+    accel_bias: Array | None = None
+
+
+def rest_of(drive: Drive, stop: Stop) -> Rest:
+    """Means over the part of a stop where levelling may work."""
+    inside = (drive.t >= stop.start + SETTLE) & (drive.t <= stop.end - GUARD)
+    where = np.flatnonzero(inside)
+    if where.size < 2:
+        return mean_over_rest(drive.omega, drive.f, stop.first, stop.last)
+    return mean_over_rest(drive.omega, drive.f, int(where[0]), int(where[-1]))
+
+
+def levelling_gain(t: Array, stops: list[Stop], rate: float | None) -> Array:
+    """(n-1,) gain of procedure 1 over each step, 1/s: from SETTLE after the start to GUARD
+    before the end of every stop; ``rate``, or 1/(time since then + 0.5 s).
+    """
+    gain = np.zeros(t.size - 1)
+    for stop in stops:
+        begin = stop.start + SETTLE
+        steps = np.flatnonzero((t[:-1] >= begin) & (t[1:] <= stop.end - GUARD))
+        gain[steps] = rate if rate is not None else 1.0 / (t[steps] - begin + MEAN_OFFSET)
+    return gain
+
+
+def stop_control(drive: Drive, *, levelling: bool, reset: bool) -> StopControl:
+    """The two procedures at the stops of a drive, over all its instants."""
+    gain = levelling_gain(drive.t, drive.stops, drive.levelling_rate)
+    numbers = stop_numbers(drive.t.size, drive.stops)
+    return StopControl(numbers, gain if levelling else 0.0 * gain, reset, len(drive.stops))
+
+
+def dead_reckon(
+    drive: Drive,
+    start: Start,
+    *,
+    levelling: bool,
+    reset: bool,
+    bias: Array | None = None,
+    accel_bias: Array | None = None,
+) -> Solution:
+    """Integrate forward from the start with the procedures that are on.
+
+    ``bias`` (n-1, 3) rad/s per step of the whole drive, else the one of the start; ``accel_bias``
+    (3,) m/s2, taken out after the scale.
+    """
+    last = drive.t.size - 1
+    per_step = np.broadcast_to(start.gyro_bias if bias is None else bias, (last, 3))
+    increments = drive.increments.corrected(per_step, start.accel_scale)
+    if accel_bias is not None:
+        dvel = increments.dvel - accel_bias * increments.dt[:, None]
+        increments = replace(increments, dvel=dvel)
+    control = stop_control(drive, levelling=levelling, reset=reset)
+    return mechanize_enu(
+        increments.part(drive.first, last),
+        position=start.position,
+        v_n=start.v_n,
+        c_nb=start.c_nb,
+        control=control.part(drive.first, last),
+        vertical="clamp" if drive.vertical == "clamp" else "free",
+        earth=drive.earth,
+    )
+
+
+# ---- gyro bias from the stops ------------------------------------------------------------------
+
+
+def biases_at_stops(drive: Drive, solution: Solution, start: Start) -> Array:
+    """(stops, 3) rad/s: mean rate of each stop less the Earth rate in its attitude (spec C 3)."""
+    out = np.zeros((len(drive.stops), 3))
+    for k, stop in enumerate(drive.stops):
+        rest = rest_of(drive, stop)
+        heading, _, _ = angles_from_c_nb(solution.c_nb[stop.last - drive.first])
+        out[k] = gyro_bias(rest, rest.c_nb(float(heading)), start.position[0], earth=drive.earth)
+    return out
+
+
+def bias_per_step(drive: Drive, seen: Array, noise: LegNoise, *, smooth: bool) -> Array:
+    """(n-1, 3) rad/s: gyro bias over every step, each stop weighed by its noise.
+
+    Offline it is interpolated between the stops; causally it is held until the next one ends.
+    """
+    duration = np.array([stop.duration for stop in drive.stops])
+    middle = np.array([0.5 * (stop.start + stop.end) for stop in drive.stops])
+    variance = noise.gyro_white**2 / np.maximum(duration - SETTLE - GUARD, 1.0)
+    track, _ = track_random_walk(middle, seen, variance, noise.gyro_bias_walk, smooth=smooth)
+    at = 0.5 * (drive.t[1:] + drive.t[:-1])
+    if smooth:
+        return np.stack([np.interp(at, middle, track[:, k]) for k in range(3)], axis=1)
+    ends = np.array([stop.end for stop in drive.stops])
+    return np.asarray(track[np.maximum(np.searchsorted(ends, at, side="right") - 1, 0)])
+
+
+def stop_records(solution: Solution, seen: Array) -> list[StopRecord]:
+    """What every stop showed, from the solution and the biases ``seen`` (stops, 3), rad/s."""
+    return [
+        StopRecord(float(np.hypot(v[0], v[1])), float(np.hypot(*tilt)), bias)
+        for v, tilt, bias in zip(
+            solution.v_before_reset, solution.tilt_correction, seen, strict=True
+        )
+    ]
+
+
+def noise_from_rest(
+    drive: Drive, *, motion_factor: float = 4.0, accel_bias: float = 0.02, level: float = 0.0017
+) -> LegNoise:
+    """Noise figures from the log's own rest.
+
+    ``motion_factor``: effective white noise while driving over that at rest (rectified vibration,
+    scale factor errors), set so that 95 % of the real errors lie inside the expected circle; the bias walk is a twentieth of the white noise per sqrt(s), which is the ratio
+    of MEMS and tactical grades alike (spec C 4: 0.02 and 9e-4, 0.002 and 9e-5 deg/s). ``level``:
+    rad, 0.1 deg of road and suspension between two stops.
+    """
+    spans = [(stop.first, stop.last) for stop in drive.stops]
+    gyro = white_noise(drive.t, drive.omega, spans)
+    accel = white_noise(drive.t, drive.f, spans)
+    gyro_white = float(np.sqrt(np.mean(gyro**2))) if np.all(np.isfinite(gyro)) else 2e-4
+    accel_white = float(np.sqrt(np.mean(accel**2))) if np.all(np.isfinite(accel)) else 5e-3
+    return LegNoise(
+        gyro_white=motion_factor * max(gyro_white, 1e-6),
+        accel_white=motion_factor * max(accel_white, 1e-4),
+        gyro_bias_walk=max(gyro_white, 1e-6) / 20.0,
+        accel_bias=accel_bias,
+        level=level,
+        gravity=9.81,
+    )

@@ -1,0 +1,216 @@
+"""Stops of the vehicle, found by the angular rate under a threshold (paper 002; spec C 1).
+
+Engine vibration is fast, the vehicle's own rotation slow. So the default statistic ``slow`` is the
+vector standard deviation, over a centred 2 s window, of the 0.25 s running mean of the angular
+rate: free of the gyro bias by construction and of vibration by the mean. The same of the specific
+force must be small too. ``rms`` is the paper's own form: the 1 s moving RMS of the bias-free rate.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from vehnav.rest import running_deviation, running_mean, runs, samples_in_window
+from vehnav.units import DEG
+
+Array = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
+Statistic = Literal["slow", "rms"]
+
+SLOW_MEAN = 0.25
+"""s: the running mean that takes engine vibration (over 5 Hz) out."""
+FORCE_THRESHOLD = 0.10
+"""m/s2: slow deviation of the specific force in a stop."""
+RMS_FORCE_THRESHOLD = 0.3
+"""m/s2: 1 s deviation of the specific force in a stop of the paper's statistic (spec A 4.2)."""
+EXTEND = 0.5
+"""s by which both ends of a quiet run are moved outward: the window is its own guard."""
+RMS_GUARD = 0.3
+"""s by which both ends of a stop of the paper's statistic are moved inward (spec A 4.2)."""
+MIN_SHARE = 0.6
+"""of the expected samples that a window must hold: a gap is not quiet."""
+MARGIN_WARNING = 0.8
+"""A stop whose statistics come this near to the threshold is reported."""
+
+
+@dataclass(frozen=True)
+class StopRule:
+    """How stops are told from driving.
+
+    Attributes
+    ----------
+    statistic : {"slow", "rms"}
+    threshold : float
+        rad/s, on the statistic of the angular rate.
+    window : float
+        s, centred.
+    dwell : float
+        s that the statistic must stay under the threshold.
+    """
+
+    statistic: Statistic = "slow"
+    threshold: float = 0.30 * DEG
+    window: float = 2.0
+    dwell: float = 1.0
+
+
+RMS_RULE = StopRule(statistic="rms", threshold=0.20 * DEG, window=1.0, dwell=3.0)
+"""Paper 002's statistic with the values of spec A 4.5 for MEMS."""
+
+
+@dataclass(frozen=True)
+class StopStatistics:
+    """The two statistics on every sample.
+
+    Attributes
+    ----------
+    rate, force : (n,)
+        rad/s and m/s2; inf where the window is not wholly inside the log or holds too few samples.
+    force_threshold : float
+        m/s2
+    """
+
+    rate: Array
+    force: Array
+    force_threshold: float
+
+    def margin(self, threshold: float) -> Array:
+        """(n,) the larger of the two over its threshold: below 1 is quiet."""
+        return np.maximum(self.rate / threshold, self.force / self.force_threshold)
+
+
+@dataclass(frozen=True)
+class Stop:
+    """One stop.
+
+    Attributes
+    ----------
+    first, last : int
+        Indices of its first and last sample.
+    start, end : float
+        s since the first sample of the log.
+    rate, force : float
+        Medians of the statistics inside, rad/s and m/s2.
+    margin : float
+        95th percentile of the margin inside: under 1, and the smaller the surer.
+    """
+
+    first: int
+    last: int
+    start: float
+    end: float
+    rate: float
+    force: float
+    margin: float
+
+    @property
+    def duration(self) -> float:
+        """Length, s."""
+        return self.end - self.start
+
+
+def stop_statistics(t: Array, omega: Array, f: Array, rule: StopRule) -> StopStatistics:
+    """Statistics of ``rule`` on every sample.
+
+    Parameters
+    ----------
+    t : (n,)
+        s, strictly increasing.
+    omega, f : (n, 3)
+        Angular rate, rad/s, and specific force, m/s2, on any axes.
+    """
+    if rule.statistic == "slow":
+        rate = running_deviation(t, running_mean(t, omega, SLOW_MEAN), rule.window)
+        force = running_deviation(t, running_mean(t, f, SLOW_MEAN), rule.window)
+        limit = FORCE_THRESHOLD
+    else:
+        bias = quiet_bias(t, omega)
+        mean_square = running_mean(t, ((omega - bias) ** 2).sum(axis=1)[:, None], rule.window)
+        rate = np.sqrt(np.maximum(mean_square[:, 0], 0.0))
+        force = running_deviation(t, f, rule.window)
+        limit = RMS_FORCE_THRESHOLD
+    valid = _window_inside(t, rule.window)
+    return StopStatistics(np.where(valid, rate, np.inf), np.where(valid, force, np.inf), limit)
+
+
+def find_stops(t: Array, omega: Array, f: Array, rule: StopRule) -> list[Stop]:
+    """The stops of a log, in order (spec C section 1, rules 1-4).
+
+    Parameters
+    ----------
+    t : (n,)
+        s since the first sample, strictly increasing.
+    omega, f : (n, 3)
+        Angular rate, rad/s, and specific force, m/s2, on any axes; biases do not matter.
+    rule : StopRule
+    """
+    statistics = stop_statistics(t, omega, f, rule)
+    return stops_from_statistics(t, statistics, rule)
+
+
+def stops_from_statistics(t: Array, statistics: StopStatistics, rule: StopRule) -> list[Stop]:
+    """Stops of statistics that are already there."""
+    margin = statistics.margin(rule.threshold)
+    quiet = runs(margin < 1.0)
+    long_enough = t[quiet[:, 1]] - t[quiet[:, 0]] >= rule.dwell
+    stops: list[Stop] = []
+    for first, last in quiet[long_enough]:
+        inside = slice(first, last + 1)
+        figures = (
+            float(np.median(statistics.rate[inside])),
+            float(np.median(statistics.force[inside])),
+            float(np.percentile(margin[inside], 95)),
+        )
+        shift = EXTEND if rule.statistic == "slow" else -RMS_GUARD
+        first = int(np.searchsorted(t, t[first] - shift, side="left"))
+        last = int(np.searchsorted(t, t[last] + shift, side="right")) - 1
+        if stops and first <= stops[-1].last:
+            first = stops[-1].last + 1
+        if last > first:
+            stops.append(Stop(first, last, float(t[first]), float(t[last]), *figures))
+    return stops
+
+
+def stopped_mask(n: int, stops: list[Stop]) -> npt.NDArray[np.bool_]:
+    """(n,) True on the samples of a stop."""
+    return stop_numbers(n, stops) >= 0
+
+
+def stop_numbers(n: int, stops: list[Stop]) -> IntArray:
+    """(n,) number of the stop that a sample lies in, -1 while moving."""
+    numbers = np.full(n, -1, dtype=np.int64)
+    for k, stop in enumerate(stops):
+        numbers[stop.first : stop.last + 1] = k
+    return numbers
+
+
+def quiet_bias(t: Array, omega: Array) -> Array:
+    """(3,) gyro bias, rad/s, from the quietest windows (spec A 4.2 rule 1).
+
+    The log is cut into 2 s windows; of the 5 % with the smallest deviation the median of their
+    means is taken, so neither stops nor a threshold need be known.
+    """
+    window = max(2.0, 4.0 * float(np.median(np.diff(t))))
+    number = ((t - t[0]) / window).astype(np.int64)
+    count = np.bincount(number)
+    full = count >= MIN_SHARE * np.median(count)
+    total = np.stack([np.bincount(number, omega[:, k]) for k in range(3)], axis=1)
+    square = np.bincount(number, np.sum((omega - omega.mean(axis=0)) ** 2, axis=1))
+    with np.errstate(invalid="ignore", divide="ignore"):
+        mean = total / count[:, None]
+        variance = square / count - np.sum((mean - omega.mean(axis=0)) ** 2, axis=1)
+    mean, variance = mean[full], variance[full]
+    quietest = np.argsort(variance, kind="stable")[: max(1, variance.size // 20)]
+    return np.asarray(np.median(mean[quietest], axis=0))
+
+
+def _window_inside(t: Array, window: float) -> npt.NDArray[np.bool_]:
+    """(n,) the centred window lies in the log and holds enough of the expected samples."""
+    expected = window / float(np.median(np.diff(t)))
+    half = 0.5 * window
+    whole = (t - half >= t[0] - 1e-9) & (t + half <= t[-1] + 1e-9)
+    return np.asarray(whole & (samples_in_window(t, window) >= MIN_SHARE * expected))
