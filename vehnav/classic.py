@@ -272,9 +272,10 @@ def noise_from_rest(
     """Noise figures from the log's own rest.
 
     ``motion_factor``: effective white noise while driving over that at rest (rectified vibration,
-    scale factor errors), set so that 95 % of the real errors lie inside the expected circle; the bias walk is a twentieth of the white noise per sqrt(s), which is the ratio
-    of MEMS and tactical grades alike (spec C 4: 0.02 and 9e-4, 0.002 and 9e-5 deg/s). ``level``:
-    rad, 0.1 deg of road and suspension between two stops.
+    scale factor errors), set so that 95 % of the real errors lie inside the expected circle; the
+    bias walk is a twentieth of the white noise per sqrt(s), the ratio of MEMS and tactical grades
+    alike (spec C 4: 0.02 and 9e-4, 0.002 and 9e-5 deg/s). ``accel_bias``: m/s2. ``level``: rad,
+    0.1 deg of road and suspension between two stops.
     """
     spans = [(stop.first, stop.last) for stop in drive.stops]
     gyro = white_noise(drive.t, drive.omega, spans)

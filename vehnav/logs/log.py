@@ -59,6 +59,9 @@ class Imu:
         Topic or columns it came from.
     frame_id : str
         The frame that the log names, or "".
+    axes : str
+        Letters of :mod:`vehnav.mounting` that the format declares: FLU for ROS (REP 103), RFU for
+        vehnav's own CSV; a declaration to be checked against gravity, not a fact.
     """
 
     t_ns: TimeArray
@@ -67,6 +70,7 @@ class Imu:
     sampling: Literal["rates", "increments"] = "rates"
     source: str = ""
     frame_id: str = ""
+    axes: str = "FLU"
 
     def __post_init__(self) -> None:
         _check_clock(self.t_ns, f"IMU {self.source}")
