@@ -257,7 +257,7 @@ def test_free_air_gradient_is_the_published_one(lat_deg: float) -> None:
         wanted = (-(0.3087691 - 0.0004398 * s2) * h + 7.2125e-8 * h * h) * MGAL
         fall = normal_gravity(lat_deg * DEG, h, WGS84) - at_0
         # their coefficients are fitted and rounded; f^2 is 1.1e-5
-        assert fall == pytest.approx(wanted, rel=5e-5)
+        assert fall == pytest.approx(wanted, rel=5e-5, abs=0.0)
 
 
 def test_constants_belong_together() -> None:
@@ -310,3 +310,5 @@ def test_position_difference_at_height() -> None:
     moved = ecef_of_pyproj(lat0 + d_lat, lon0 + d_lon, h) - ecef_of_pyproj(lat0, lon0, h)
     assert np.linalg.norm(got) == pytest.approx(np.linalg.norm(moved), rel=1e-8)
     assert got[0, 0] < 0 < got[0, 1]
+    assert position_difference(0.1, 0.2, 0.1, 0.2).tolist() == [0.0, 0.0]
+    assert position_difference(np.zeros((4, 5)), 0.0, 0.0, 0.0).shape == (4, 5, 2)

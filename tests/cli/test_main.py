@@ -211,7 +211,7 @@ def test_help_loads_nothing_heavy() -> None:
         f"print('HEAVY', [m for m in {HEAVY!r} if m in sys.modules], sorted(commands))"
     )
     result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
-    shell_modules = ["common", "main", "options", "settings"]
+    shell_modules = ["main", "status"]
     wanted = f"HEAVY [] {[f'vehnav.cli.{name}' for name in shell_modules]}"
     assert result.stdout.splitlines()[-1] == wanted, result.stderr
 

@@ -7,20 +7,17 @@ click's: ``eval "$(_VEHNAV_COMPLETE=bash_source vehnav)"`` (or ``zsh_source``, `
 from __future__ import annotations
 
 import contextlib
-import difflib
 import importlib
-import importlib.metadata
 import importlib.util
 import os
 import sys
-import traceback
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 import click
 
 from vehnav._version import __version__
-from vehnav.cli.common import BROKEN_PIPE, BUG, INTERRUPTED, OK, UNUSABLE
+from vehnav.cli.status import BROKEN_PIPE, BUG, INTERRUPTED, OK, UNUSABLE
 from vehnav.errors import VehnavError
 
 COMMANDS: dict[str, tuple[str, str]] = {
@@ -67,6 +64,8 @@ class LazyGroup(click.Group):
     ) -> tuple[str | None, click.Command | None, list[str]]:
         """Find the command, or suggest the nearest name."""
         if args and not args[0].startswith("-") and args[0] not in self.list_commands(ctx):
+            import difflib
+
             close = difflib.get_close_matches(args[0], self.list_commands(ctx), n=1, cutoff=0.5)
             hint = f"; did you mean {close[0]!r}?" if close else ""
             ctx.fail(f"no command {args[0]!r}{hint}")
@@ -163,6 +162,9 @@ def _broken_pipe() -> int:
 
 
 def _bug() -> int:
+    import importlib.metadata
+    import traceback
+
     traceback.print_exc()
     try:
         urls = importlib.metadata.metadata("vehnav").get_all("Project-URL") or []

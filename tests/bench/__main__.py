@@ -1,0 +1,27 @@
+"""``make bench``: speed, printed as ratios within one run; times are never asserted.
+
+``python tests/bench`` runs all, ``python tests/bench kernel`` one.
+"""
+
+from __future__ import annotations
+
+import importlib
+import platform
+import sys
+
+BENCHES = ("help", "kernel", "run")
+
+
+def main() -> int:
+    """Run the benches that are named, or all; 1 if any disagreed with its yardstick."""
+    print(f"python {platform.python_version()}, {platform.machine()} {platform.system()}")
+    good = True
+    for name in sys.argv[1:] or BENCHES:
+        bench = importlib.import_module(f"bench_{name}")
+        print(f"\n{name}: {(bench.__doc__ or '').splitlines()[0]}")
+        good = bench.main() and good
+    return 0 if good else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())
