@@ -1,0 +1,171 @@
+"""Topics of a recording and what was gathered from them, whatever container they came in."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from vehnav.errors import FormatError
+from vehnav.logs.messages.decoder import Declaration, Decoder, make_decoder, type_tree
+from vehnav.logs.messages.roles import Role, find_roles
+from vehnav.logs.messages.stamps import Clock
+from vehnav.logs.messages.types import Batch, Struct
+
+Ints = npt.NDArray[np.int64]
+State = Literal["sound", "unverified", "recovered"]
+
+
+@dataclass
+class Collector:
+    """What one role of a topic delivered so far.
+
+    Attributes
+    ----------
+    read, recovered, unverified, bad : int
+        Messages delivered; of these from damaged parts; from parts with a wrong checksum; and
+        messages that do not agree with their schema.
+    bad_span, unverified_span : (first, last) log time or None
+    """
+
+    role: Role
+    decoder: Decoder
+    parts: dict[str, list[npt.NDArray[Any]]] = field(default_factory=dict)
+    read: int = 0
+    recovered: int = 0
+    unverified: int = 0
+    bad: int = 0
+    bad_span: tuple[int, int] | None = None
+    unverified_span: tuple[int, int] | None = None
+
+    def add(self, batch: Batch, state: State) -> None:
+        """Decode a batch and keep the result."""
+        decoded = self.decoder.decode(batch)
+        row = decoded.row
+        if row.size < batch.start.size:
+            left = np.delete(batch.log_ns, row)
+            self.bad += left.size
+            self.bad_span = _widen(self.bad_span, left)
+        if not row.size:
+            return
+        self.read += row.size
+        self.recovered += row.size if state == "recovered" else 0
+        whole = row.size == batch.start.size
+        log_ns = batch.log_ns if whole else batch.log_ns[row]
+        if state == "unverified":
+            self.unverified += row.size
+            self.unverified_span = _widen(self.unverified_span, log_ns)
+        columns = {"log": log_ns, "publish": batch.publish_ns if whole else batch.publish_ns[row]}
+        for name, values in (columns | decoded.columns).items():
+            self.parts.setdefault(name, []).append(values)
+
+    def columns(self) -> dict[str, npt.NDArray[Any]]:
+        """Everything kept, in order of log time; can be called once."""
+        joined = {name: _concatenate(self.parts.pop(name)) for name in list(self.parts)}
+        log = joined.get("log")
+        if log is not None and np.any(log[1:] < log[:-1]):
+            order = np.argsort(log, kind="stable")
+            joined = {name: values[order] for name, values in joined.items()}
+        return joined
+
+
+def _concatenate(parts: list[npt.NDArray[Any]]) -> npt.NDArray[Any]:
+    whole = np.concatenate(parts)
+    parts.clear()
+    return whole.astype(whole.dtype.newbyteorder("="), copy=False)
+
+
+def _widen(span: tuple[int, int] | None, times: Ints) -> tuple[int, int]:
+    low, high = int(times.min()), int(times.max())
+    return (low, high) if span is None else (min(low, span[0]), max(high, span[1]))
+
+
+@dataclass
+class Topic:
+    """A topic: its messages' declaration, what could be used of it, what was seen of it.
+
+    Attributes
+    ----------
+    problem : str
+        Why its messages cannot be understood, or "".
+    count : int
+        Messages seen, or named by indexes that proved to be complete.
+    span : (first, last) log time or None
+    declared_count : int
+        Messages by the container's statistics, where they were not used otherwise.
+    collectors : list of Collector
+        For what is wanted only.
+    clock : Clock or None
+        The stamps that were chosen, once it is used.
+    used_as : list of str
+        Roles it took.
+    """
+
+    name: str
+    declared: Declaration
+    tree: Struct | None = None
+    roles: list[Role] = field(default_factory=list)
+    problem: str = ""
+    count: int = 0
+    span: tuple[int, int] | None = None
+    declared_count: int = 0
+    collectors: list[Collector] = field(default_factory=list)
+    clock: Clock | None = None
+    used_as: list[str] = field(default_factory=list)
+
+    def see(self, log_ns: Ints, count: int | None = None) -> None:
+        """Note messages of these log times."""
+        self.count += log_ns.size if count is None else count
+        if log_ns.size:
+            self.span = _widen(self.span, log_ns)
+
+    def gather(self, role: Role) -> Collector:
+        """Begin to collect a role."""
+        if self.tree is None:
+            raise ValueError(f"topic {self.name} is not understood")
+        decoder = make_decoder(self.declared, self.tree, role.wanted())
+        collector = Collector(role, decoder)
+        self.collectors.append(collector)
+        return collector
+
+    def add(self, batch: Batch, state: State) -> None:
+        """Messages for all that is collected."""
+        for collector in self.collectors:
+            collector.add(batch, state)
+
+
+class Topics:
+    """Topics by name and declaration; channels of several files or publishers share them."""
+
+    def __init__(self) -> None:
+        self._topics: dict[tuple[str, Declaration], Topic] = {}
+        self._gather_new = False
+
+    def gather_all(self) -> None:
+        """Collect every role of every topic, also of those yet to come."""
+        self._gather_new = True
+        for topic in self:
+            for role in topic.roles:
+                topic.gather(role)
+
+    def __iter__(self) -> Iterator[Topic]:
+        return iter(self._topics.values())
+
+    def get(self, name: str, declared: Declaration) -> Topic:
+        """The topic, made and understood at its first mention."""
+        key = (name, declared)
+        if key not in self._topics:
+            topic = Topic(name, declared)
+            try:
+                topic.tree = type_tree(declared)
+                topic.roles = find_roles(topic.tree)
+            except FormatError as error:
+                topic.problem = str(error)
+            self._topics[key] = topic
+            if self._gather_new:
+                for role in topic.roles:
+                    topic.gather(role)
+        return self._topics[key]
