@@ -10,7 +10,6 @@ The stop procedures of paper 002 act inside the loop: levelling adds its control
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -36,9 +35,10 @@ from vehnav.rotation import (
     mat_vec,
     rotation_coefficients,
     scale,
-    subtract,
 )
 from vehnav.strapdown.increments import Increments
+from vehnav.strapdown.solution import Solution as Solution
+from vehnav.strapdown.solution import StopControl as StopControl
 
 Array = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
@@ -88,6 +88,20 @@ def coriolis(v_n: Vec3, omega_ie_n: Vec3, omega_en_n: Vec3) -> Vec3:
 
 
 @kernel
+def unfelt_acceleration(
+    v_n: Vec3, omega_ie_n: Vec3, omega_en_n: Vec3, gravity: float, dv_n: Vec3
+) -> Vec3:
+    """What changes v_n besides the specific force, m/s2: Coriolis, gravity, turning axes (004, 9).
+
+    ``dv_n`` is the velocity increment of the step in the axes of its start; the axes turn under
+    it, by half of omega_in dt on average.
+    """
+    turning = scale(-0.5, cross(add(omega_ie_n, omega_en_n), dv_n))
+    a = add(coriolis(v_n, omega_ie_n, omega_en_n), turning)
+    return (a[0], a[1], a[2] - gravity)
+
+
+@kernel
 def attitude_update(c_nb: Mat3, zeta: Vec3, phi: Vec3) -> Mat3:
     """C <- exp(-[zeta x]) C exp([phi x]): Poisson's equation over one step (004 eq. 11)."""
     turned_frame = dcm_from_rotvec(scale(-1.0, zeta))
@@ -113,7 +127,7 @@ def enu_step(
     position: Vec3,
     v_n: Vec3,
     c_nb: Mat3,
-    place: tuple[float, float],
+    memory: tuple[float, Vec3],
     dt: float,
     now: tuple[Vec3, Vec3],
     before: tuple[Vec3, Vec3],
@@ -124,15 +138,16 @@ def enu_step(
     clamp: bool,
     gravity_height: float,
     earth: Ellipsoid,
-) -> tuple[Vec3, Vec3, Mat3, tuple[float, float], Vec3, Vec3]:
+) -> tuple[Vec3, Vec3, Mat3, tuple[float, Vec3], Vec3, Vec3]:
     """One step of the recursion.
 
-    ``position`` is (lat rad, lon rad, h m); ``place`` the meridian radius, m, and gravity, m/s2,
-    of the step before, good enough to predict the middle of this one; ``now``, ``before``: the
+    ``position`` is (lat rad, lon rad, h m); ``memory`` the meridian radius, m, and the acceleration
+    that no sensor feels, m/s2 (:func:`unfelt_acceleration`), of the step before, which predict the
+    middle of this one; ``now``, ``before``: the
     increments (dtheta, dvel) of this step and, scaled to its length, of the one before; ``c`` the
     :func:`coning_factor`; ``gain`` the levelling gain (1/s, 0 off); ``stopped``: V := 0 at the
     end; ``gravity_height``: where gravity is taken, m, or NaN for the height at mid-step. Returns
-    position, velocity, attitude, place, the velocity before the reset (m/s) and the control
+    position, velocity, attitude, memory, the velocity before the reset (m/s) and the control
     rotation (rad) of the step.
     """
     lat, lon, h = position
@@ -144,10 +159,10 @@ def enu_step(
     )
     dv_n = mat_vec(c_nb, dv_b)
 
-    v_mid = v_n if coast else add(v_n, scale(0.5, (dv_n[0], dv_n[1], dv_n[2] - place[1] * dt)))
+    v_mid = v_n if coast else add(v_n, scale(0.5, add(dv_n, scale(dt, memory[1]))))
     if clamp:
         v_mid = (v_mid[0], v_mid[1], 0.0)
-    lat_mid = lat + 0.5 * dt * v_mid[1] / place[0]
+    lat_mid = lat + 0.5 * dt * v_mid[1] / memory[0]
     h_mid = h + 0.25 * dt * (v_n[2] + v_mid[2])
     radius_m, radius_n = curvature_radii(lat_mid, h_mid, earth)
     gravity = normal_gravity(
@@ -160,14 +175,15 @@ def enu_step(
     zeta = scale(dt, add(omega_ie_n, omega_en_n))
     control = (0.0, 0.0, 0.0)
     if gain > 0.0:
-        control = scale(dt, levelling_rate(scale(1.0 / dt, dv_n), gain, gravity))
+        # |dt|: a run backward in time settles too
+        control = scale(abs(dt), levelling_rate(scale(1.0 / dt, dv_n), gain, gravity))
     c_new = attitude_update(c_nb, add(zeta, control), phi)
 
-    dv_n = subtract(dv_n, scale(0.5, cross(zeta, dv_n)))
-    v_new = add(v_n, add(dv_n, scale(dt, coriolis(v_mid, omega_ie_n, omega_en_n))))
-    v_new = (v_new[0], v_new[1], v_new[2] - gravity * dt)
+    unfelt = unfelt_acceleration(v_mid, omega_ie_n, omega_en_n, gravity, dv_n)
+    v_new = add(v_n, add(dv_n, scale(dt, unfelt)))
     if coast:
         v_new = held_velocity(v_n, c_nb, c_new)
+        unfelt = memory[1]
     if clamp:
         v_new = (v_new[0], v_new[1], 0.0)
     v_before = v_new
@@ -180,7 +196,20 @@ def enu_step(
         lon + half * (v_n[0] + v_new[0]) / (radius_n * cos_lat),
         h + half * (v_n[2] + v_new[2]),
     )
-    return new_position, v_new, c_new, (radius_m, gravity), v_before, control
+    return new_position, v_new, c_new, (radius_m, unfelt), v_before, control
+
+
+@kernel
+def start_memory(
+    position: Vec3, v_n: Vec3, c_nb: Mat3, dvel: Vec3, gravity_height: float, earth: Ellipsoid
+) -> tuple[float, Vec3]:
+    """What :func:`enu_step` remembers of the step before, for the first one."""
+    lat, _, h = position
+    radius_m, radius_n = curvature_radii(lat, h, earth)
+    gravity = normal_gravity(lat, h if math.isnan(gravity_height) else gravity_height, earth)
+    omega_en_n = transport_rate(v_n, radius_m, radius_n, math.tan(lat))
+    dv_n = mat_vec(c_nb, dvel)
+    return radius_m, unfelt_acceleration(v_n, earth_rate(lat, earth), omega_en_n, gravity, dv_n)
 
 
 @entry_kernel
@@ -209,9 +238,8 @@ def integrate_enu(
     dv_prev = (0.0, 0.0, 0.0)
     dt_prev = 0.0
     seen = -1
-    place = (
-        curvature_radii(position[0], position[2], earth)[0],
-        normal_gravity(position[0], position[2], earth),
+    memory = start_memory(
+        position, v_n, c_nb, (dvel[0, 0], dvel[0, 1], dvel[0, 2]), gravity_height, earth
     )
     if stop_id[0] >= 0:
         seen = stop_id[0]
@@ -230,8 +258,8 @@ def integrate_enu(
                 th_prev = scale(ratio, th_prev)
                 dv_prev = scale(ratio, dv_prev)
             stop = stop_id[k]
-            position, v_n, c_nb, place, v_before, control = enu_step(
-                position, v_n, c_nb, place, dt, (th, dv), (th_prev, dv_prev), c,
+            position, v_n, c_nb, memory, v_before, control = enu_step(
+                position, v_n, c_nb, memory, dt, (th, dv), (th_prev, dv_prev), c,
                 gain[k - 1], reset and stop >= 0, coast[k - 1], clamp, gravity_height, earth,
             )  # fmt: skip
             if stop >= 0:
@@ -253,69 +281,6 @@ def integrate_enu(
 
 
 # ---- the call from Python ----------------------------------------------------------------------
-
-
-@dataclass(frozen=True)
-class StopControl:
-    """What to do at each instant and step because of stops.
-
-    Attributes
-    ----------
-    stop_id : (n,) int64
-        Number of the stop that an instant lies in, -1 while moving.
-    gain : (n-1,)
-        Levelling gain over each step, 1/s; 0 where off.
-    reset : bool
-        Whether V := 0 at the instants of a stop.
-    count : int
-        Number of stops.
-    """
-
-    stop_id: IntArray
-    gain: Array
-    reset: bool
-    count: int
-
-    @classmethod
-    def none(cls, n: int) -> StopControl:
-        """No stops, for n instants."""
-        return cls(np.full(n, -1, dtype=np.int64), np.zeros(n - 1), reset=False, count=0)
-
-    def part(self, first: int, last: int) -> StopControl:
-        """For the instants ``first`` to ``last``, both included; stops keep their numbers."""
-        return StopControl(
-            self.stop_id[first : last + 1], self.gain[first:last], self.reset, self.count
-        )
-
-    def reversed(self) -> StopControl:
-        """For increments run backward."""
-        return StopControl(
-            self.stop_id[::-1].copy(), self.gain[::-1].copy(), self.reset, self.count
-        )
-
-
-@dataclass(frozen=True)
-class Solution:
-    """What the mechanization returns, at the n instants of the increments.
-
-    Attributes
-    ----------
-    position : (n, 3)
-        lat rad, lon rad, h m.
-    v_n : (n, 3)
-        East, north, up, m/s.
-    c_nb : (n, 3, 3)
-    v_before_reset : (stops, 3)
-        Velocity found on the first instant of each stop, before the reset, m/s.
-    tilt_correction : (stops, 2)
-        Rotation about east and north that levelling applied in each stop, rad.
-    """
-
-    position: Array
-    v_n: Array
-    c_nb: Array
-    v_before_reset: Array
-    tilt_correction: Array
 
 
 def mechanize_enu(

@@ -2,7 +2,8 @@
 
 A step runs from sample k to sample k+1. Rates are integrated by 4-point quadrature with the true,
 uneven steps (spec A 5.4): third order, against first order of a held sample and second order of
-the trapezoid. Where the steps are too uneven, at the ends and beside gaps the trapezoid is used.
+the trapezoid; one-sided at the ends and beside gaps. Over a gap, and where neighbouring steps are
+too uneven, the trapezoid is used.
 """
 
 from __future__ import annotations
@@ -140,14 +141,26 @@ def _quadrature(t: Array, y: Array, gaps: npt.NDArray[np.bool_], holding: Holdin
     out = 0.5 * h * (y[:-1] + y[1:])
     if holding == "trapezoid" or t.size < 4:
         return out
-    a, h1, b = h[:-2], h[1:-1], h[2:]
-    even = (a * MAX_UNEVEN >= h1) & (b * MAX_UNEVEN >= h1)
-    even &= (a <= MAX_UNEVEN * h1) & (b <= MAX_UNEVEN * h1)
-    even &= ~(gaps[:-2] | gaps[1:-1] | gaps[2:])[:, None]
-    w0, w1, w2, w3 = _weights(a, h1, b)
-    cubic = w0 * y[:-3] + w1 * y[1:-2] + w2 * y[2:-1] + w3 * y[3:]
-    out[1:-1] = np.where(even, cubic, out[1:-1])
+    alike = (h[1:] <= MAX_UNEVEN * h[:-1]) & (h[:-1] <= MAX_UNEVEN * h[1:])
+    alike &= ~(gaps[1:] | gaps[:-1])[:, None]
+    three = alike[:-1] & alike[1:]
+    first = _one_sided(h[:-2], h[1:-1], h[2:], y[:-3], y[1:-2], y[2:-1], y[3:])
+    last = _one_sided(h[2:], h[1:-1], h[:-2], y[3:], y[2:-1], y[1:-2], y[:-3])
+    out[:-2] = np.where(three, first, out[:-2])
+    out[2:] = np.where(three, last, out[2:])
+    w0, w1, w2, w3 = _weights(h[:-2], h[1:-1], h[2:])
+    central = w0 * y[:-3] + w1 * y[1:-2] + w2 * y[2:-1] + w3 * y[3:]
+    out[1:-1] = np.where(three, central, out[1:-1])
     return out
+
+
+def _one_sided(h: Array, b: Array, c: Array, y0: Array, y1: Array, y2: Array, y3: Array) -> Array:
+    """Integral over [0, h] of the cubic through the nodes 0, h, h+b, h+b+c (Newton's form)."""
+    d01, d12, d23 = (y1 - y0) / h, (y2 - y1) / b, (y3 - y2) / c
+    d012, d123 = (d12 - d01) / (h + b), (d23 - d12) / (b + c)
+    d0123 = (d123 - d012) / (h + b + c)
+    trapezoid = 0.5 * h * (y0 + y1)
+    return np.asarray(trapezoid - h**3 / 6.0 * (d012 - (0.5 * h + b) * d0123))
 
 
 def _weights(a: Array, h: Array, b: Array) -> tuple[Array, Array, Array, Array]:
