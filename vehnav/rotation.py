@@ -220,9 +220,9 @@ def c_from_quaternion(q: npt.ArrayLike) -> Array:
     >>> c_from_quaternion([0.0, 0.0, 0.0, 2.0]).tolist()
     [[-1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, 1.0]]
     """
-    q = np.asarray(q, float)
-    q = q / np.linalg.norm(q, axis=-1, keepdims=True)
-    w, x, y, z = q[..., 0], q[..., 1], q[..., 2], q[..., 3]
+    unit: Array = np.asarray(q, float)
+    unit = unit / np.linalg.norm(unit, axis=-1, keepdims=True)
+    w, x, y, z = unit[..., 0], unit[..., 1], unit[..., 2], unit[..., 3]
     rows = [
         [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
         [2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)],
