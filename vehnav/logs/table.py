@@ -1,0 +1,300 @@
+"""A text file of numbers becomes columns: delimiter, header and decimal sign are found, then pandas
+parses the columns that are wanted.
+
+Every line that does not fit is counted and named; nothing is guessed about what columns mean
+(:mod:`vehnav.logs.columns` does that).
+"""
+
+from __future__ import annotations
+
+import csv
+import re
+import warnings
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+import numpy.typing as npt
+
+from vehnav.errors import Finding, FormatError
+from vehnav.logs.clock import NO_TIME
+from vehnav.logs.log import Array, TimeArray
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+SAMPLE_BYTES: Final = 1 << 18
+DELIMITERS: Final = ("\t", ";", "|", ",", " ")
+COMMENTS: Final = ("#", "%", "//")
+MAX_BAD_SHARE: Final = 0.5
+"""A column with more text than this does not hold the quantity."""
+
+
+@dataclass(frozen=True)
+class Sheet:
+    """How a text file of numbers is laid out.
+
+    Attributes
+    ----------
+    path : str
+    names : tuple of str
+        One per column, as in the header; "1", "2", ... where there is no header.
+    delimiter : str
+        One of :data:`DELIMITERS`; " " stands for any white space.
+    decimal : str
+        "." or ",".
+    skip : int
+        Lines before the first line of numbers.
+    encoding : str
+    preamble : tuple of str
+        The lines before the header.
+    sample : tuple of tuple of str
+        The fields of the first lines of numbers.
+    """
+
+    path: str
+    names: tuple[str, ...]
+    delimiter: str
+    decimal: str
+    skip: int
+    encoding: str
+    preamble: tuple[str, ...]
+    sample: tuple[tuple[str, ...], ...]
+
+
+def sniff(path: str) -> Sheet:
+    """The layout of a text file, from its beginning.
+
+    Raises
+    ------
+    FormatError
+        No line with at least two fields, most of them numbers.
+    """
+    text, encoding, complete = _beginning(path)
+    lines = re.split(r"\r\n|\n|\r", text)
+    if not complete and len(lines) > 1:
+        lines.pop()
+    forms = (None if _is_comment(line) else _form(line) for line in lines)
+    skip, form = next(((k, form) for k, form in enumerate(forms) if form is not None), (0, None))
+    if form is None:
+        raise FormatError(
+            f"{path}: no line of numbers among the first {len(lines)} lines; "
+            "expected a table with one row per sample"
+        )
+    delimiter, decimal = form
+    sample = tuple(tuple(split(line, delimiter)) for line in lines[skip : skip + 50] if line)
+    width = Counter(len(fields) for fields in sample).most_common(1)[0][0]
+    names, preamble = _header(lines[:skip], delimiter, width)
+    names += ("",) * (width - len(names))  # rows that end with a delimiter
+    return Sheet(path, names, delimiter, decimal, skip, encoding, preamble, sample)
+
+
+def _beginning(path: str) -> tuple[str, str, bool]:
+    """Text of the first bytes, encoding, and whether that is all."""
+    with Path(path).open("rb") as file:
+        raw = file.read(SAMPLE_BYTES + 1)
+    complete = len(raw) <= SAMPLE_BYTES
+    raw = raw[:SAMPLE_BYTES]
+    if raw[:2] in (b"\xff\xfe", b"\xfe\xff"):
+        return raw.decode("utf-16", errors="replace"), "utf-16", complete
+    try:
+        text = raw.decode("utf-8-sig", errors="strict" if complete else "ignore")
+        return text, "utf-8-sig" if raw[:3] == b"\xef\xbb\xbf" else "utf-8", complete
+    except UnicodeDecodeError:
+        return raw.decode("latin-1"), "latin-1", complete
+
+
+def _is_comment(line: str) -> bool:
+    return not line.strip() or line.lstrip().startswith(COMMENTS)
+
+
+def split(line: str, delimiter: str) -> list[str]:
+    """Fields of a line, stripped, quotes removed."""
+    if delimiter == " ":
+        return line.split()
+    return [field.strip() for field in next(csv.reader([line], delimiter=delimiter))]
+
+
+def _number_share(fields: Sequence[str], decimal: str) -> float:
+    """Share of the fields that are numbers; empty ones do not count."""
+    filled = [field for field in fields if field]
+    good = sum(is_number(field, decimal) for field in filled)
+    return good / len(filled) if filled else 0.0
+
+
+def is_number(field: str, decimal: str = ".") -> bool:
+    """Whether a field is a number with that decimal sign."""
+    if decimal == "," and "." in field:
+        return False
+    try:
+        float(field.replace(",", ".", 1) if decimal == "," else field)
+    except ValueError:
+        return False
+    return True
+
+
+def _form(line: str) -> tuple[str, str] | None:
+    """(delimiter, decimal sign) under which most fields are numbers; None where none does it."""
+    best, choice = 0.5, None
+    for delimiter in DELIMITERS:
+        fields = split(line, delimiter)
+        for decimal in (".", ","):
+            share = _number_share(fields, decimal)
+            if len(fields) > 1 and share > best and not (decimal == "," == delimiter):
+                best, choice = share, (delimiter, decimal)
+    return choice
+
+
+def _header(
+    lines: Sequence[str], delimiter: str, width: int
+) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Names of the columns and the lines before the header."""
+    for k in range(len(lines) - 1, -1, -1):
+        line = lines[k].strip().lstrip("#%/").strip()
+        if not line:
+            continue
+        fields = split(line, delimiter)
+        if abs(len(fields) - width) <= 1 and len(fields) > 1:
+            return tuple(fields), tuple(lines[:k])
+        break
+    return tuple(str(k + 1) for k in range(width)), tuple(lines)
+
+
+# ---- parsing ---------------------------------------------------------------------------------
+
+
+class Table:
+    """The rows of a sheet, parsed once.
+
+    Attributes
+    ----------
+    sheet : Sheet
+    rows : int
+        Rows that fit the layout.
+    findings : list of Finding
+        Lines and fields that did not; grows while columns are taken out.
+    """
+
+    def __init__(self, sheet: Sheet) -> None:
+        """Parse the file."""
+        self.sheet = sheet
+        self.findings: list[Finding] = []
+        # every column is parsed: with usecols pandas cuts long rows silently
+        self._frame, self._long = self._read()
+        self.rows = len(self._frame)
+        if not self.rows:
+            raise FormatError(f"{sheet.path}: a header, but no rows")
+        if self._long:
+            text = (
+                f"{sheet.path}: {len(self._long)} lines with more than {len(sheet.names)} fields "
+                f"dropped (the first is line {self._long[0]})"
+            )
+            self.findings.append(Finding("bad-rows", "error", text))
+
+    def _read(self, **how: Any) -> tuple[pd.DataFrame, list[int]]:
+        """The frame, and the numbers of the lines that have too many fields."""
+        import pandas as pd
+
+        sheet = self.sheet
+        form: dict[str, Any] = {"sep": sheet.delimiter, "skipinitialspace": True}
+        if sheet.delimiter == " ":
+            form = {"sep": r"\s+"}
+        try:
+            with warnings.catch_warnings(record=True) as caught:
+                warnings.simplefilter("always")
+                frame: pd.DataFrame = pd.read_csv(
+                    sheet.path,
+                    header=None,
+                    names=list(range(len(sheet.names))),
+                    skiprows=sheet.skip,
+                    decimal=sheet.decimal,
+                    encoding=sheet.encoding,
+                    encoding_errors="replace",
+                    engine="c",
+                    index_col=False,
+                    on_bad_lines="warn",
+                    **form,
+                    **how,
+                )
+        except pd.errors.ParserError as error:
+            raise FormatError(f"{sheet.path}: not a table: {error}") from error
+        messages = "".join(str(warning.message) for warning in caught)
+        return frame, [int(number) for number in re.findall(r"Skipping line (\d+)", messages)]
+
+    def numbers(self, column: int) -> Array:
+        """(rows,) float64: the column; text in it becomes NaN, counted with its first row."""
+        import pandas as pd
+
+        series = self._frame[column]
+        if pd.api.types.is_numeric_dtype(series.dtype):
+            return np.asarray(series.to_numpy(), np.float64)
+        values = pd.to_numeric(series, errors="coerce")
+        bad = np.flatnonzero(values.isna().to_numpy() & series.notna().to_numpy())
+        name = self.sheet.names[column]
+        if bad.size > MAX_BAD_SHARE * self.rows:
+            raise FormatError(
+                f"{self.sheet.path}: column {name!r} does not hold numbers "
+                f"(row {bad[0] + 1}: {str(series.iloc[bad[0]])[:40]!r})"
+            )
+        self._note_text(column, bad, series)
+        return values.to_numpy(np.float64)
+
+    def integers(self, column: int) -> TimeArray | None:
+        """(rows,) int64 without loss, :data:`NO_TIME` for empty fields; None if not integers."""
+        series = self._frame[column]
+        if series.dtype == np.int64:
+            return series.to_numpy()
+        if series.dtype == np.float64 and not series.isna().any():
+            return None
+        # an empty or broken field kept pandas from reading integers; a float64 has 53 bits only
+        text = series if series.dtype != np.float64 else self._again(column, dtype=str)
+        if text is None:
+            return None
+        whole = text.str.fullmatch(r"\s*[+-]?\d{1,18}|[+-]?[1-8]\d{18}\s*").fillna(False)
+        good = whole.to_numpy(dtype=bool)
+        if good.sum() < (1.0 - MAX_BAD_SHARE) * text.notna().sum():
+            return None
+        self._note_text(column, np.flatnonzero(~good & text.notna().to_numpy()), text)
+        values = np.full(self.rows, NO_TIME, np.int64)
+        values[good] = text[good].astype("int64").to_numpy()
+        return values
+
+    def _again(self, column: int, **how: Any) -> pd.Series[Any] | None:
+        """A column parsed in another way; None where that does not work."""
+        usecols = None if self._long else [column]
+        try:
+            series = self._read(usecols=usecols, **how)[0][column]
+        except (ValueError, TypeError, OverflowError):
+            return None
+        return series if len(series) == self.rows else None
+
+    def _note_text(self, column: int, bad: npt.NDArray[np.intp], series: pd.Series[Any]) -> None:
+        """A finding for fields that are not numbers."""
+        if not bad.size:
+            return
+        text = (
+            f"{self.sheet.path}: {bad.size} fields of column {self.sheet.names[column]!r} are not "
+            f"numbers (row {bad[0] + 1}: {str(series.iloc[bad[0]])[:40]!r})"
+        )
+        self.findings.append(Finding("bad-rows", "error", text))
+
+    def fixed_point(self, column: int, decimals: int) -> TimeArray | None:
+        """(rows,) int64: a decimal column times 10**decimals, exact where float64 is not.
+
+        None unless every field has just that many decimals.
+        """
+        if self.sheet.decimal != ".":
+            return None
+        exact = self._again(column, dtype={column: np.int64}, thousands=".")
+        if exact is None:
+            return None
+        values: TimeArray = exact.to_numpy()
+        rough = self.numbers(column) * 10.0**decimals
+        return values if np.allclose(values, rough, rtol=1e-12, atol=1.0) else None
+
+    def text(self, column: int) -> pd.Series[Any]:
+        """The column as it stands."""
+        return self._frame[column]
