@@ -1,0 +1,351 @@
+"""``run(log, config) -> Run``: the only place that knows the order of the steps.
+
+Samples in body axes -> stops -> start (level, bias; position and heading from GPS or the user) ->
+integration with the corrections -> trajectory -> errors against GPS. Each step is a function of
+its own module; here they are put one after the other and their findings collected.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Any, Final
+
+import numpy as np
+import numpy.typing as npt
+
+from vehnav.classic import Corrections, Drive, Outcome, Start, StopRecord, noise_from_rest
+from vehnav.config import Config
+from vehnav.earth import ELLIPSOIDS
+from vehnav.errors import Finding, LogError, VehnavError
+from vehnav.evaluation import Errors, compare
+from vehnav.legs import LegNoise
+from vehnav.logs.log import Gnss, Log
+from vehnav.offline import run_stops
+from vehnav.prepare import Samples, hopeless_gaps, prepare_samples, usable_imu
+from vehnav.start import Alignment, Given, GpsUse, find_start
+from vehnav.stops import (
+    MARGIN_WARNING,
+    RMS_RULE,
+    Stop,
+    StopRule,
+    StopStatistics,
+    stop_statistics,
+    stopped_mask,
+    stops_from_statistics,
+)
+from vehnav.trajectory import Trajectory
+from vehnav.units import DEG, NS
+
+Array = npt.NDArray[np.float64]
+
+FAST_STOP: Final = 3.0
+"""m/s before the reset above which a stop is reported."""
+VARIANT_RATE: Final = 10.0
+"""Hz at which the tracks of the other methods are kept."""
+
+METHODS: Final = {
+    "free": Corrections(levelling=False, reset=False, refine=False),
+    "levelling": Corrections(levelling=True, reset=False, refine=False),
+    "reset": Corrections(levelling=False, reset=True, refine=False),
+    "as_published": Corrections(levelling=True, reset=True, refine=False),
+    "default": Corrections(),
+}
+"""The methods of the table that every run prints (paper 002's comparison, and ours)."""
+
+
+@dataclass(frozen=True)
+class Run:
+    """What a run found.
+
+    Attributes
+    ----------
+    log : Log
+    config : Config
+    axes : str
+        Letters in force.
+    trajectory : Trajectory
+    stops : list of Stop
+    records : list of StopRecord
+        What each stop showed, and what was done.
+    alignment : Alignment
+    gps : GpsUse
+    errors : Errors or None
+        After the GPS window; None without GPS or where no fix is left to judge.
+    errors_before : Errors or None
+        Of the part before the first stop, which is integrated backward.
+    method_errors : mapping of str to Errors
+        The same judge over the methods of :data:`METHODS`.
+    variants : mapping of str to Trajectory
+        Their tracks at 10 Hz at most.
+    noise : LegNoise or None
+        Noise figures from the log's rest that weighed the stops.
+    findings : tuple of Finding
+    """
+
+    log: Log
+    config: Config
+    axes: str
+    trajectory: Trajectory
+    stops: list[Stop]
+    records: list[StopRecord]
+    alignment: Alignment
+    gps: GpsUse
+    errors: Errors | None
+    errors_before: Errors | None
+    method_errors: Mapping[str, Errors]
+    variants: Mapping[str, Trajectory]
+    noise: LegNoise | None
+    findings: tuple[Finding, ...]
+
+    @property
+    def start_ns(self) -> int:
+        """Where seconds count from."""
+        return self.log.start_ns
+
+
+def run(log: Log, config: Config = Config()) -> Run:  # noqa: B008 - frozen
+    """Dead reckoning of a log.
+
+    Raises
+    ------
+    LogError
+        The log cannot be used: no IMU, too slow, a hole of over 10 s, no stop.
+    ConfigError
+        An option does not fit.
+    """
+    samples = _samples(log, config)
+    rule = stop_rule(config)
+    statistics = stop_statistics(samples.t, samples.omega, samples.f, rule)
+    stops = stops_from_statistics(samples.t, statistics, rule)
+    if not stops and config.start_attitude is None:
+        raise LogError(no_stop_advice(log.path, statistics, rule))
+    drive = Drive(
+        samples.t,
+        samples.omega,
+        samples.f,
+        samples.increments,
+        stops,
+        ELLIPSOIDS[config.ellipsoid],
+        config.vertical,
+        config.levelling_rate,
+    )
+    gnss = log.gnss if config.gps != "none" else None
+    noise = noise_from_rest(drive)
+
+    def solve(part: Drive, start: Start, corrections: Corrections) -> Outcome:
+        return run_stops(part, start, corrections, noise=noise)
+
+    corrections = corrections_of(config)
+    start, alignment, gps, sigmas, start_findings = find_start(
+        drive, samples, gnss, _given(config), corrections, solve
+    )
+    outcome = _solve(drive, start, corrections, noise, sigmas)
+    trajectory = _trajectory(outcome, samples, stops)
+    variants = _variants(drive, start, noise, sigmas, samples, config, outcome)
+    judged = {} if log.gnss is None else _judge_all(trajectory, variants, log.gnss, gps)
+    errors, before = judged.pop("", None), judged.pop("before", None)
+    findings = [*log.findings, *samples.findings, *start_findings]
+    findings += _stop_findings(stops, outcome.records, samples)
+    findings += [] if errors is None else list(errors.findings)
+    return Run(
+        log, config, samples.axes, trajectory, stops, outcome.records, alignment, gps,
+        errors, before, judged, variants, noise, tuple(findings),
+    )  # fmt: skip
+
+
+def split_log(log: Log) -> list[Log]:
+    """The parts of a log between holes of over 10 s in the IMU, as logs (``--split``)."""
+    if log.imu is None:
+        return [log]
+    edges = [0, *(hopeless_gaps(log.imu.t_ns) + 1), log.imu.t_ns.size]
+    parts = []
+    for a, b in pairwise(edges):
+        inside = slice(int(a), int(b))
+        imu = replace(
+            log.imu,
+            t_ns=log.imu.t_ns[inside],
+            gyro=log.imu.gyro[inside],
+            accel=log.imu.accel[inside],
+        )
+        parts.append(replace(log, imu=imu))
+    return parts
+
+
+def corrections_of(config: Config) -> Corrections:
+    """Which procedures the options ask for."""
+    if config.method == "free":
+        return METHODS["free"]
+    refine = not config.as_published and config.levelling and config.reset
+    return Corrections(config.levelling, config.reset, refine, config.causal)
+
+
+def stop_rule(config: Config) -> StopRule:
+    """The rule of the options, with the defaults of its statistic."""
+    rule = StopRule() if config.stop_statistic == "slow" else RMS_RULE
+    if config.stop_threshold is not None:
+        rule = replace(rule, threshold=config.stop_threshold * DEG)
+    if config.stop_window is not None:
+        rule = replace(rule, window=config.stop_window)
+    if config.stop_dwell is not None:
+        rule = replace(rule, dwell=config.stop_dwell)
+    return rule
+
+
+def no_stop_advice(path: str, statistics: StopStatistics, rule: StopRule) -> str:
+    """Why a log without a stop cannot be run, with its quietest moment."""
+    margin = statistics.margin(rule.threshold)
+    k = int(np.argmin(margin))
+    return (
+        f"{path}: no stop was found, so neither the level nor the gyro bias is known. The quietest "
+        f"moment has {statistics.rate[k] / DEG:.3f} deg/s (threshold {rule.threshold / DEG:.2f}) "
+        f"and {statistics.force[k]:.3f} m/s2 (threshold {statistics.force_threshold:.2f}). Give "
+        "--start-attitude HEADING,PITCH,ROLL, or raise --stop-threshold if the vehicle did stand"
+    )
+
+
+# ---- the steps ---------------------------------------------------------------------------------
+
+
+def _samples(log: Log, config: Config) -> Samples:
+    def stamp(seconds: float | None) -> int | None:
+        return None if seconds is None else log.start_ns + round(seconds / NS)
+
+    imu = usable_imu(
+        log.imu,
+        path=log.path,
+        contents=log.contents,
+        start_ns=stamp(config.start),
+        end_ns=stamp(config.end),
+    )
+    roll, pitch, yaw = (x * DEG for x in config.mount)
+    return prepare_samples(
+        imu,
+        path=log.path,
+        start_ns=log.start_ns,
+        axes=None if config.axes in (None, "auto") else config.axes,
+        accel_axes=config.accel_axes,
+        mount=(roll, pitch, yaw),
+        max_gap=config.max_gap,
+    )
+
+
+def _given(config: Config) -> Given:
+    """What the options say of the start, in radians."""
+    position, heading, attitude = (
+        config.start_position,
+        config.start_heading,
+        config.start_attitude,
+    )
+    return Given(
+        position=None if position is None else (position[0] * DEG, position[1] * DEG, position[2]),
+        heading=None if heading is None else heading * DEG,
+        attitude=None
+        if attitude is None
+        else (attitude[0] * DEG, attitude[1] * DEG, attitude[2] * DEG),
+        gps_seconds=config.gps_start_seconds,
+    )
+
+
+def _solve(
+    drive: Drive,
+    start: Start,
+    corrections: Corrections,
+    noise: LegNoise,
+    sigmas: tuple[float, float],
+) -> Outcome:
+    return run_stops(
+        drive,
+        start,
+        corrections,
+        noise=noise,
+        position_sigma=sigmas[0],
+        heading_sigma=sigmas[1],
+    )
+
+
+def _trajectory(outcome: Outcome, samples: Samples, stops: list[Stop]) -> Trajectory:
+    span = slice(outcome.first, outcome.first + outcome.position.shape[0])
+    return Trajectory(
+        t_ns=samples.t_ns[span],
+        lat=outcome.position[:, 0],
+        lon=outcome.position[:, 1],
+        height=outcome.position[:, 2],
+        v_n=outcome.v_n,
+        c_nb=outcome.c_nb,
+        stopped=stopped_mask(samples.t_ns.size, stops)[span],
+        sigma_pos=outcome.sigma_pos,
+        sigma_heading=outcome.sigma_heading,
+    )
+
+
+def _variants(
+    drive: Drive,
+    start: Start,
+    noise: LegNoise,
+    sigmas: tuple[float, float],
+    samples: Samples,
+    config: Config,
+    outcome: Outcome,
+) -> dict[str, Trajectory]:
+    """The tracks of the methods of the table, thinned; nothing to compare without stops."""
+    if not drive.stops:
+        return {}
+    step = max(1, int(1.0 / (VARIANT_RATE * float(np.median(np.diff(drive.t))))))
+    tracks = {}
+    for name, corrections in METHODS.items():
+        corrections = replace(corrections, causal=config.causal)
+        same = corrections == corrections_of(config)
+        found = outcome if same else _solve(drive, start, corrections, noise, sigmas)
+        full = _trajectory(found, samples, drive.stops)
+        index = np.unique(np.append(np.arange(0, full.size, step), full.size - 1))
+        tracks[name] = full.rows(index)
+    return tracks
+
+
+def _judge_all(
+    trajectory: Trajectory, variants: Mapping[str, Trajectory], gnss: Gnss, gps: GpsUse
+) -> dict[str, Errors]:
+    """Errors of the trajectory (""), before the first stop ("before"), and of the variants.
+
+    A fix that the solution used judges nothing; what no fix can judge is left out.
+    """
+    judged: dict[str, Errors] = {}
+    since = None if gps.until_ns is None else gps.until_ns + 1
+    try:
+        judged[""] = compare(trajectory, gnss, judge_from_ns=since)
+        for name, track in variants.items():
+            judged[name] = compare(track, gnss, judge_from_ns=since)
+    except VehnavError:
+        judged.clear()
+    first_stop = int(trajectory.t_ns[np.argmax(trajectory.stopped)])
+    if first_stop > trajectory.t_ns[0] and gps.until_ns is not None:
+        with suppress(VehnavError):
+            judged["before"] = compare(trajectory, gnss, exclude=[(first_stop, 2**62)])
+    return judged
+
+
+def _stop_findings(stops: list[Stop], records: list[StopRecord], samples: Samples) -> list[Finding]:
+    """Stops that barely passed, and those that the solution entered too fast."""
+    findings = []
+    for k, (stop, record) in enumerate(zip(stops, records, strict=True)):
+        span = int(samples.t_ns[stop.first]), int(samples.t_ns[stop.last])
+        if stop.margin > MARGIN_WARNING:
+            text = f"stop {k + 1} is near the threshold (margin {stop.margin:.2f} of 1)"
+            findings.append(Finding("stop-margin", "warning", text, *span))
+        if record.speed_before_reset > FAST_STOP:
+            text = (
+                f"stop {k + 1}: the dead-reckoned speed was {record.speed_before_reset:.1f} m/s "
+                "before the reset; either the errors of the leg before are that large, or this is "
+                "no stop"
+            )
+            findings.append(Finding("stop-speed", "warning", text, *span))
+    return findings
+
+
+def summary_of(errors: Errors) -> Mapping[str, Any]:
+    """The horizontal statistics of a method, for the methods table."""
+    horizontal = errors.statistics()["horizontal_m"]
+    return {"horizontal_m": None if horizontal is None else horizontal.to_dict()}

@@ -1,0 +1,203 @@
+"""From the IMU of a log to what the methods work on: body axes, seconds, increments, findings."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Final
+
+import numpy as np
+import numpy.typing as npt
+
+from vehnav.errors import Finding, LogError
+from vehnav.logs.log import MIN_IMU_RATE_HZ, Imu
+from vehnav.mounting import gravity_contradiction, sensor_to_body
+from vehnav.stops import StopRule, find_stops
+from vehnav.strapdown.increments import (
+    Increments,
+    gap_steps,
+    increments_from_log,
+    increments_from_rates,
+)
+from vehnav.units import NS
+
+Array = npt.NDArray[np.float64]
+
+HOPELESS_GAP: Final = 10.0
+"""s without IMU: nothing is known about the motion any more (cli.md, Gaps)."""
+MIN_SECONDS: Final = 5.0
+"""s of IMU below which there is nothing to find."""
+
+
+@dataclass(frozen=True)
+class Samples:
+    """The IMU in body axes.
+
+    Attributes
+    ----------
+    t_ns : (n,) int64
+    t : (n,)
+        s from the start of the log.
+    omega, f : (n, 3)
+        rad/s and m/s2 (mean rates over the step where the log has increments).
+    increments : Increments
+        Over the n-1 steps.
+    axes : str
+        Letters in force.
+    findings : tuple of Finding
+    """
+
+    t_ns: npt.NDArray[np.int64]
+    t: Array
+    omega: Array
+    f: Array
+    increments: Increments
+    axes: str
+    findings: tuple[Finding, ...]
+
+
+def usable_imu(
+    imu: Imu | None,
+    *,
+    path: str,
+    contents: Sequence[Mapping[str, Any]],
+    start_ns: int | None,
+    end_ns: int | None,
+) -> Imu:
+    """The IMU between two stamps, or LogError with the reason why it cannot be integrated."""
+    if imu is None:
+        there = ", ".join(f"{row.get('name')} ({row.get('type')})" for row in contents)
+        raise LogError(
+            f"{path}: no IMU found; it has {there or 'no messages'}. A topic of another type is "
+            "chosen by --imu-topic, columns by --columns"
+        )
+    inside = np.ones(imu.t_ns.size, bool)
+    if start_ns is not None:
+        inside &= imu.t_ns >= start_ns
+    if end_ns is not None:
+        inside &= imu.t_ns <= end_ns
+    if not np.all(inside):
+        imu = replace(imu, t_ns=imu.t_ns[inside], gyro=imu.gyro[inside], accel=imu.accel[inside])
+    span = (imu.t_ns[-1] - imu.t_ns[0]) * NS if imu.t_ns.size else 0.0
+    if imu.t_ns.size < 10 or span < MIN_SECONDS:
+        raise LogError(
+            f"{path}: {imu.t_ns.size} IMU samples over {span:.1f} s on {imu.source or 'the IMU'}; "
+            f"at least {MIN_SECONDS:g} s are needed (--start, --end?)"
+        )
+    if imu.rate_hz < MIN_IMU_RATE_HZ:
+        raise LogError(
+            f"{path}: the IMU {imu.source} runs at {imu.rate_hz:.2f} Hz; instantaneous samples "
+            f"below {MIN_IMU_RATE_HZ:g} Hz cannot be integrated, nor stops be told from driving. "
+            "Log it at 50 Hz or more"
+        )
+    return imu
+
+
+def prepare_samples(
+    imu: Imu,
+    *,
+    path: str,
+    start_ns: int,
+    axes: str | None,
+    accel_axes: str | None,
+    mount: tuple[float, float, float],
+    max_gap: float,
+) -> Samples:
+    """Turn the samples into the body, integrate them over their steps, name the gaps.
+
+    Parameters
+    ----------
+    imu : Imu
+    path : str
+        For messages.
+    start_ns : int
+        Where seconds count from.
+    axes, accel_axes : str or None
+        Letters; None: as the format declares, checked against gravity.
+    mount : (roll, pitch, yaw), rad
+    max_gap : float
+        s
+
+    Raises
+    ------
+    LogError
+        Gravity contradicts the axes that the format declares, or over 10 s of IMU are missing.
+    """
+    t: Array = np.asarray((imu.t_ns - start_ns) * NS, dtype=np.float64)
+    letters = axes or imu.axes
+    dt = np.diff(t, prepend=t[0] - imu.median_dt)[:, None]
+    as_rates = imu.sampling == "rates"
+    gyro, accel = (imu.gyro, imu.accel) if as_rates else (imu.gyro / dt, imu.accel / dt)
+    contradiction = gravity_contradiction(_gravity(t, gyro, accel), accel_axes or letters)
+    findings: list[Finding] = []
+    if contradiction is not None:
+        if axes is None:
+            raise LogError(f"{path}: {contradiction}. Set --axes (none was given)")
+        findings.append(Finding("axes-contradiction", "warning", contradiction))
+    c_gyro, c_accel = sensor_to_body(letters, accel_axes=accel_axes, mount=mount)
+    findings += _gap_findings(imu.t_ns, t, path, max_gap)
+    omega, f = gyro @ c_gyro.T, accel @ c_accel.T
+    if as_rates:
+        increments = increments_from_rates(t, omega, f, max_gap=max_gap)
+    else:
+        increments = increments_from_log(
+            t, imu.gyro @ c_gyro.T, imu.accel @ c_accel.T, max_gap=max_gap
+        )
+    return Samples(imu.t_ns, t, omega, f, increments, letters, tuple(findings))
+
+
+def hopeless_gaps(t_ns: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
+    """Indices of the samples before a hole of over 10 s."""
+    return np.flatnonzero(np.diff(t_ns) * NS > HOPELESS_GAP)
+
+
+def _gravity(t: Array, gyro: Array, accel: Array) -> Array:
+    """(3,) mean specific force over the stops, else over the log, on the sensor axes."""
+    stops = find_stops(t, gyro, accel, StopRule())
+    if not stops:
+        return np.asarray(accel.mean(axis=0))
+    longest = max(stops, key=lambda stop: stop.duration)
+    return np.asarray(accel[longest.first : longest.last + 1].mean(axis=0))
+
+
+def _gap_findings(
+    t_ns: npt.NDArray[np.int64], t: Array, path: str, max_gap: float
+) -> list[Finding]:
+    """One finding per long gap, one for all the short ones."""
+    hopeless = hopeless_gaps(t_ns)
+    if hopeless.size:
+        k = int(hopeless[0])
+        raise LogError(
+            f"{path}: no IMU between {t[k]:.1f} and {t[k + 1]:.1f} s ({t[k + 1] - t[k]:.1f} s); "
+            f"over {HOPELESS_GAP:g} s nothing can be known. --split makes a result of each part, "
+            "--start and --end choose one"
+        )
+    dt = np.diff(t)
+    gaps = np.flatnonzero(gap_steps(t))
+    long = gaps[dt[gaps] > max_gap]
+    short = gaps[dt[gaps] <= max_gap]
+    findings = []
+    if short.size:
+        worst = int(short[np.argmax(dt[short])])
+        findings.append(
+            Finding(
+                "gap",
+                "info",
+                f"{short.size} short gaps in the IMU, {dt[short].sum():.2f} s in all, the longest "
+                f"{dt[worst]:.3f} s at {t[worst]:.1f} s; the values at their edges were held",
+                int(t_ns[short[0]]),
+                int(t_ns[short[-1] + 1]),
+            )
+        )
+    for k in long:
+        findings.append(
+            Finding(
+                "gap",
+                "warning",
+                f"no IMU for {dt[k]:.2f} s; attitude rate and speed were held (--max-gap "
+                f"{max_gap:g} s)",
+                int(t_ns[k]),
+                int(t_ns[k + 1]),
+            )
+        )
+    return findings
