@@ -33,8 +33,8 @@ class Candidate:
 
     @property
     def label(self) -> str:
-        """Topic, and the part of the message where it is not the whole of it."""
-        path = ".".join(self.role.path)
+        """Topic, and the part of the message where it is not the whole of it (or its twist)."""
+        path = "" if self.role.name == "speed" else ".".join(self.role.path)
         return f"{self.topic.name} ({path})" if path else self.topic.name
 
     def collector(self) -> Collector:
