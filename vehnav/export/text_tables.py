@@ -17,6 +17,10 @@ from vehnav.trajectory import Trajectory
 TimeArray = npt.NDArray[np.int64]
 
 FORMAT_KEY: Final = b"vehnav.trajectory"
+YAW: Final = "yaw_enu_deg"
+"""0 = east, counter-clockwise; roll and pitch beside it are those of a forward-left-up body."""
+ALIASES: Final = {"v_east": "v_east_m_s", "v_north": "v_north_m_s", "v_up": "v_up_m_s"}
+READ_NAMES: Final = frozenset({TIME, YAW, *DECIMALS, *ALIASES})
 
 
 def write_csv(trajectory: Trajectory, path: Path, **_: Any) -> None:
@@ -26,16 +30,23 @@ def write_csv(trajectory: Trajectory, path: Path, **_: Any) -> None:
 
 
 def read_csv(path: Path) -> Trajectory:
-    """A CSV with ``time_s, lat_deg, lon_deg`` and any other column of ``trajectory.csv``."""
+    """A CSV with ``time_s, lat_deg, lon_deg`` and any other column of ``trajectory.csv``.
+
+    Instead of the heading it may have ``yaw_enu_deg``, as truth files of ROS-like origin do.
+    """
     import pandas as pd
 
     try:
-        frame = pd.read_csv(path, dtype=float, usecols=lambda name: name in (TIME, *DECIMALS))
+        frame = pd.read_csv(path, dtype=float, usecols=lambda name: name in READ_NAMES)
     except (ValueError, UnicodeDecodeError) as error:
         raise FormatError(f"{path}: not a table of numbers: {error}") from error
     if TIME not in frame:
         raise FormatError(f"{path}: no column {TIME}; it is not a trajectory of vehnav")
-    columns = {n: frame[n].to_numpy() for n in frame.columns if n != TIME}
+    columns = {ALIASES.get(n, n): frame[n].to_numpy() for n in frame.columns if n != TIME}
+    yaw = columns.pop(YAW, None)
+    if yaw is not None and "heading_deg" not in columns:  # Euler angles of a forward-left-up body
+        columns["heading_deg"] = 90.0 - yaw
+        columns["pitch_deg"] = -columns.get("pitch_deg", np.zeros(yaw.size))
     return from_columns(exact_time(path, TIME, separator=","), columns, where=str(path))
 
 

@@ -1,0 +1,161 @@
+"""``vehnav compare``: one screen, one document, bars, and errors that name what is wrong."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner, Result
+from drives import Circle, trajectory_of
+
+from vehnav.cli.main import cli
+from vehnav.export import write_trajectory
+
+
+def run(*args: object) -> Result:
+    return CliRunner().invoke(cli, ["compare", *map(str, args)])
+
+
+@pytest.fixture
+def files(tmp_path: Path) -> dict[str, Path]:
+    """A drive on a circle, one 3 m east and 4 m north of it, and its fixes at 1 Hz as CSV."""
+    circle = Circle()
+    t = np.arange(0.0, 120.005, 0.01)
+    paths = {}
+    for name, moved in (("good", (0.0, 0.0, 0.0)), ("off", (3.0, 4.0, 0.0))):
+        paths[name] = tmp_path / f"{name}.csv"
+        made = trajectory_of(t, circle.enu(t) + np.array(moved), circle.v(t), circle.heading(t))
+        write_trajectory(made, paths[name])
+    fixes = trajectory_of(t, circle.enu(t), circle.v(t), circle.heading(t)).rows(
+        slice(0, None, 100)
+    )
+    paths["gps"] = tmp_path / "gps.csv"
+    rows = zip(fixes.t_ns.tolist(), np.degrees(fixes.lat), np.degrees(fixes.lon), strict=True)
+    text = [f"{ns // 10**9}.{ns % 10**9:09d},{lat:.10f},{lon:.10f},30" for ns, lat, lon in rows]
+    paths["gps"].write_text("\n".join(["time_s,lat_deg,lon_deg,height_m", *text, ""]))
+    return paths
+
+
+def test_one_screen(files) -> None:
+    result = run(files["off"], files["gps"])
+    assert result.exit_code == 0, result.stderr
+    lines = result.stdout.splitlines()
+    assert len(lines) <= 24
+    assert "121 of 121 judged" in result.stdout
+    row = next(line for line in lines if line.startswith("horizontal m"))
+    assert row.split()[2:] == ["5.00"] * 6
+    assert "1200 m in 120.0 s" in result.stdout
+    assert result.stderr == ""
+
+
+def test_json_is_one_document(files) -> None:
+    result = run(files["off"], files["gps"], "--json")
+    document = json.loads(result.stdout)
+    assert document["version"] == 1
+    (row,) = document["trajectories"]
+    assert row["errors"]["horizontal_m"]["rms"] == pytest.approx(5.0, abs=1e-3)
+    assert row["errors"]["east_m"]["mean"] == pytest.approx(3.0, abs=1e-3)
+    assert row["fixes"]["judged"] == 121
+    assert row["errors"]["heading_deg"] is None
+
+
+def test_several_trajectories_in_one_table(files) -> None:
+    result = run(files["good"], files["off"], files["gps"])
+    assert result.exit_code == 0
+    table = result.stdout.splitlines()[-2:]
+    assert float(table[0].split()[1]) < 0.001
+    assert float(table[1].split()[1]) == 5.0
+
+
+def test_a_trajectory_as_truth_judges_heading_and_velocity(files) -> None:
+    document = json.loads(run(files["off"], files["good"], "--json").stdout)
+    errors = document["trajectories"][0]["errors"]
+    assert errors["heading_deg"]["max"] < 1e-4
+    assert errors["velocity_m_s"]["max"] < 1e-4
+    assert errors["horizontal_m"]["rms"] == pytest.approx(5.0, abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("bar", "status"),
+    [
+        ("horizontal_m.max=5.1", 0),
+        ("horizontal_m.max=4.9", 1),
+        ("errors.horizontal_m.max=4.9", 1),
+        ("cep95_m=4", 1),
+        ("heading_deg.max=1", 1),  # undefined: not shown to be met
+    ],
+)
+def test_bars(files, bar: str, status: int) -> None:
+    result = run(files["off"], files["gps"], "--max", bar)
+    assert result.exit_code == status, result.stderr
+    assert ("missed" in result.stderr) == (status == 1)
+    assert result.stdout  # the table is printed either way
+
+
+@pytest.mark.parametrize(
+    ("bar", "text"),
+    [
+        ("horizontl_m.max=5", "did you mean 'horizontal_m.max'"),
+        ("horizontal_m=5", "a group: rms"),
+        ("horizontal_m.max", "expected METRIC=VALUE"),
+        ("horizontal_m.max=x", "not a valid number"),
+    ],
+)
+def test_wrong_bars(files, bar: str, text: str) -> None:
+    result = run(files["off"], files["gps"], "--max", bar)
+    assert result.exit_code == 2
+    assert text in result.stderr
+
+
+def test_from_and_to(files) -> None:
+    result = run(files["off"], files["gps"], "--from", 60, "--to", "2024-03-26T20:11:30Z", "--json")
+    (row,) = json.loads(result.stdout)["trajectories"]
+    # 20:10:00 + 90 s is the last one; 60 the first
+    assert row["fixes"]["judged"] == 31
+    assert row["duration_s"] == pytest.approx(30.0)
+    assert row["errors"]["distance_m"] == pytest.approx(300.0, rel=5e-3)
+
+
+def test_gps_time_offset(files) -> None:
+    late = json.loads(run(files["good"], files["gps"], "--gps-time-offset", 1, "--json").stdout)
+    (row,) = late["trajectories"]
+    assert row["time_offset_s"] == 1.0
+    # the fixes stand 10 m of arc behind the trajectory: a chord of 200 sin(0.05)
+    assert row["errors"]["horizontal_m"]["rms"] == pytest.approx(200 * np.sin(0.05), abs=1e-3)
+
+
+def test_lever_arm(files) -> None:
+    arm = run(files["good"], files["gps"], "--lever-arm", "1.5,0,0", "--json")
+    errors = json.loads(arm.stdout)["trajectories"][0]["errors"]
+    assert errors["cross_m"]["mean"] == pytest.approx(1.5, abs=0.02)
+
+
+def test_wrong_inputs(files, tmp_path: Path) -> None:
+    assert run(files["gps"]).exit_code == 2
+    missing = run(tmp_path / "none.csv", files["gps"])
+    assert missing.exit_code == 2
+    assert "none.csv: no such file" in missing.stderr
+    (tmp_path / "empty.csv").touch()
+    assert run(files["good"], tmp_path / "empty.csv").exit_code == 2
+    text = files["gps"].read_text().splitlines()
+    (tmp_path / "two.csv").write_text("\n".join(text[:3]) + "\n")
+    two = run(files["good"], tmp_path / "two.csv")
+    assert two.exit_code == 2
+    assert "only 2 GPS fixes" in two.stderr
+    assert "two.csv" in two.stderr
+
+
+def test_every_kind_of_file_on_both_sides(files, tmp_path: Path, shared_data: Path) -> None:
+    """Real files: RTKLIB text, MCAP, truth CSV; a file against itself has no error."""
+    drive = shared_data / "drive_0708"
+    document = json.loads(run(drive / "gnss.pos", drive / "drive_0708.mcap", "--json").stdout)
+    errors = document["trajectories"][0]["errors"]
+    assert errors["horizontal_m"]["max"] < 1e-3  # the same fixes, once as text
+    assert 3950 < errors["distance_m"] < 4150  # README of the log: 4.05 km
+    assert errors["reference_sigma_m"] < 0.2  # mostly RTK
+    truth = shared_data / "kitti_oxts" / "2011_09_30_drive_0018_truth.csv"
+    itself = json.loads(run(truth, truth, "--json").stdout)["trajectories"][0]["errors"]
+    assert itself["heading_deg"]["max"] < 1e-9
+    assert 2150 < itself["distance_m"] < 2250  # README: 2.2 km
