@@ -225,7 +225,7 @@ def declared_columns(
     """
     found: dict[str, Column] = {}
     for key, value in options.columns.items():
-        quantity, unit = _quantity(key)
+        quantity, unit = quantity_and_unit(key)
         sign = -1 if value.startswith("-") and value not in names else 1
         name = value[1:].strip() if sign < 0 else value
         index = _index_of(name, names)
@@ -241,7 +241,7 @@ def declared_columns(
     return found
 
 
-def _quantity(key: str) -> tuple[str, str | None]:
+def quantity_and_unit(key: str) -> tuple[str, str | None]:
     """Quantity and unit of a key of ``--columns``."""
     if key in QUANTITIES or key in TIMES:
         return key, None

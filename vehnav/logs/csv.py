@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from vehnav.errors import Finding, LogError
 from vehnav.logs.check import clean_gnss, clean_imu, clean_speed
-from vehnav.logs.columns import list_names
+from vehnav.logs.columns import GPS_QUANTITIES, list_names, quantity_and_unit
 from vehnav.logs.layout import Layout, choose_clock, lay_out, scale_to_si
 from vehnav.logs.log import Array, Gnss, Imu, Log, ReadOptions, Speed, TimeArray
 from vehnav.logs.table import Table
@@ -42,7 +42,7 @@ def read_csv(path: str, options: ReadOptions) -> Log:
     LogError
         No gyro and accelerometer columns and no positions; the text lists what there is.
     """
-    layout = lay_out(path, options)
+    layout = lay_out(path, recording_options(options))
     positions = layout.has("lat", "lon")
     if layout.imu is None and (not positions or layout.some_inertial):
         raise LogError(layout.missing_imu())
@@ -118,6 +118,18 @@ def read_csv_speed(path: str, options: ReadOptions) -> tuple[Speed, list[Finding
     return speed, [*table.findings, *findings]
 
 
+def recording_options(options: ReadOptions) -> ReadOptions:
+    """Options for the recording: without the columns of the GPS and speed kept beside it."""
+    beside = GPS_QUANTITIES if options.gps_file else frozenset()
+    beside |= {"speed"} if options.speed_file else frozenset()
+    columns = {
+        key: value
+        for key, value in options.columns.items()
+        if not key.startswith("gps_time") and quantity_and_unit(key)[0] not in beside
+    }
+    return replace(options, columns=columns)
+
+
 def gps_options(options: ReadOptions) -> ReadOptions:
     """Options for a GPS file: ``gps_time...`` names its time column."""
     columns = {
@@ -173,7 +185,7 @@ def _imu(
         where=layout.sheet.path,
     )
     findings.extend(notes)
-    return imu
+    return replace(imu, axes=layout.axes)
 
 
 def _gnss(table: Table, layout: Layout, t_ns: TimeArray, findings: list[Finding]) -> Gnss | None:

@@ -7,6 +7,7 @@ Without a declared unit SI is taken, and degrees for latitude and longitude.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
@@ -55,6 +56,20 @@ class Layout:
             if self.has(*names[0], *names[1]):
                 return names
         return None
+
+    @property
+    def axes(self) -> str:
+        """The axes that the file declares (``# axes: XYZ``), else vehnav's own, else the preset's.
+
+        vehnav's own table, recognised by its names, is right-forward-up.
+        """
+        for line in self.sheet.preamble:
+            declared = re.search(r"\baxes\s*[:=]\s*([FBLRUD]{3})\b", line)
+            if declared:
+                return declared[1]
+        own = {f"{name}_{axis}" for name in ("gyro", "accel") for axis in AXES}
+        lower = {name.lower() for name in self.sheet.names}
+        return "RFU" if own <= lower and lower & {"t_ns", "time_s"} else self.preset.axes
 
     @property
     def some_inertial(self) -> bool:

@@ -37,6 +37,8 @@ class Preset:
         Header names that together belong to no other layout; empty: never detected.
     units : mapping
         Quantity, or beginning of a quantity up to "_" -> unit, where the header does not say.
+    axes : str
+        Where x, y, z of the sensor usually point; a declaration to be checked, not a fact.
     """
 
     name: str
@@ -44,6 +46,7 @@ class Preset:
     columns: Mapping[str, str] = field(default_factory=_nothing)
     detect: tuple[str, ...] = ()
     units: Mapping[str, str] = field(default_factory=_nothing)
+    axes: str = "FLU"
 
     def matches(self, names: Sequence[str]) -> bool:
         """Whether the header is this layout's."""
