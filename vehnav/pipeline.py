@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 import numpy.typing as npt
@@ -41,6 +41,7 @@ from vehnav.units import DEG, NS
 
 Array = npt.NDArray[np.float64]
 
+DEFAULTS: Final = Config()
 FAST_STOP: Final = 3.0
 """m/s before the reset above which a stop is reported."""
 VARIANT_RATE: Final = 10.0
@@ -54,6 +55,38 @@ METHODS: Final = {
     "default": Corrections(),
 }
 """The methods of the table that every run prints (paper 002's comparison, and ours)."""
+
+
+@dataclass(frozen=True)
+class StopSearch:
+    """The stops of a log and what they were found in.
+
+    Attributes
+    ----------
+    samples : Samples
+    rule : StopRule
+    statistics : StopStatistics
+    stops : list of Stop
+    """
+
+    samples: Samples
+    rule: StopRule
+    statistics: StopStatistics
+    stops: list[Stop]
+
+    @property
+    def stopped(self) -> npt.NDArray[np.bool_]:
+        """(n,) whether each sample lies in a stop."""
+        return stopped_mask(self.samples.t.size, self.stops)
+
+    def quietest(self) -> dict[str, float]:
+        """When the statistics were lowest, and what they were."""
+        k = int(np.argmin(self.statistics.margin(self.rule.threshold)))
+        return {
+            "time_s": float(self.samples.t[k]),
+            "rate_deg_s": float(self.statistics.rate[k]) / DEG,
+            "force_m_s2": float(self.statistics.force[k]),
+        }
 
 
 @dataclass(frozen=True)
@@ -106,7 +139,7 @@ class Run:
         return self.log.start_ns
 
 
-def run(log: Log, config: Config = Config()) -> Run:  # noqa: B008 - frozen
+def run(log: Log, config: Config = DEFAULTS) -> Run:
     """Dead reckoning of a log.
 
     Raises
@@ -116,12 +149,10 @@ def run(log: Log, config: Config = Config()) -> Run:  # noqa: B008 - frozen
     ConfigError
         An option does not fit.
     """
-    samples = _samples(log, config)
-    rule = stop_rule(config)
-    statistics = stop_statistics(samples.t, samples.omega, samples.f, rule)
-    stops = stops_from_statistics(samples.t, statistics, rule)
+    search = search_stops(log, config)
+    samples, stops = search.samples, search.stops
     if not stops and config.start_attitude is None:
-        raise LogError(no_stop_advice(log.path, statistics, rule))
+        raise LogError(no_stop_advice(log.path, search))
     drive = Drive(
         samples.t,
         samples.omega,
@@ -194,15 +225,22 @@ def stop_rule(config: Config) -> StopRule:
     return rule
 
 
-def no_stop_advice(path: str, statistics: StopStatistics, rule: StopRule) -> str:
+def search_stops(log: Log, config: Config = DEFAULTS) -> StopSearch:
+    """The stops of a log, with the samples they were found in. LogError as :func:`run`."""
+    samples, rule = _samples(log, config), stop_rule(config)
+    statistics = stop_statistics(samples.t, samples.omega, samples.f, rule)
+    return StopSearch(samples, rule, statistics, stops_from_statistics(samples.t, statistics, rule))
+
+
+def no_stop_advice(path: str, search: StopSearch) -> str:
     """Why a log without a stop cannot be run, with its quietest moment."""
-    margin = statistics.margin(rule.threshold)
-    k = int(np.argmin(margin))
+    quiet = search.quietest()
     return (
         f"{path}: no stop was found, so neither the level nor the gyro bias is known. The quietest "
-        f"moment has {statistics.rate[k] / DEG:.3f} deg/s (threshold {rule.threshold / DEG:.2f}) "
-        f"and {statistics.force[k]:.3f} m/s2 (threshold {statistics.force_threshold:.2f}). Give "
-        "--start-attitude HEADING,PITCH,ROLL, or raise --stop-threshold if the vehicle did stand"
+        f"moment, at {quiet['time_s']:.1f} s, has {quiet['rate_deg_s']:.3f} deg/s (threshold "
+        f"{search.rule.threshold / DEG:.2f}) and {quiet['force_m_s2']:.3f} m/s2 (threshold "
+        f"{search.statistics.force_threshold:.2f}). Give --start-attitude HEADING,PITCH,ROLL, or "
+        "raise --stop-threshold if the vehicle did stand"
     )
 
 
@@ -343,9 +381,3 @@ def _stop_findings(stops: list[Stop], records: list[StopRecord], samples: Sample
             )
             findings.append(Finding("stop-speed", "warning", text, *span))
     return findings
-
-
-def summary_of(errors: Errors) -> Mapping[str, Any]:
-    """The horizontal statistics of a method, for the methods table."""
-    horizontal = errors.statistics()["horizontal_m"]
-    return {"horizontal_m": None if horizontal is None else horizontal.to_dict()}

@@ -168,6 +168,8 @@ class Log:
         Whether data was lost, recovered, or read from parts whose checksum does not match.
     contents : tuple of mapping
         One row per topic or column group: name, type, count, rate_hz (what ``info`` lists).
+    gps_time_offset : float
+        s, that was added to the stamps of the GPS on request.
     """
 
     path: str
@@ -179,6 +181,7 @@ class Log:
     integrity: Mapping[str, int] = field(default_factory=lambda: MappingProxyType({}))
     damaged: bool = False
     contents: tuple[Mapping[str, Any], ...] = ()
+    gps_time_offset: float = 0.0
 
     @property
     def start_ns(self) -> int:

@@ -14,11 +14,14 @@ from typing import Any, Final
 import numpy as np
 
 from vehnav.errors import Finding, LogError
+from vehnav.logs.gpx import is_gpx
 from vehnav.logs.log import Gnss, Log, ReadOptions, Speed
+from vehnav.logs.nmea import is_nmea
 from vehnav.logs.pos import is_pos
 from vehnav.logs.timebase import is_unix
 from vehnav.units import NS
 
+DAY_NS: Final = 86_400 * 1_000_000_000
 DEFAULTS: Final = ReadOptions()
 BEGINNING: Final = 4096
 
@@ -53,6 +56,7 @@ class Format:
     refusal: str = ""
 
 
+CSV_READER: Final = "vehnav.logs.csv:read_csv"
 _UNPACK = "compressed as a whole; unpack it first ({command})"
 
 FORMATS: Final = (
@@ -98,11 +102,13 @@ FORMATS: Final = (
     Format("HDF5", magic=(b"\x89HDF\r\n",), refusal="HDF5 or MATLAB 7.3; export it as CSV"),
     Format("MATLAB", magic=(b"MATLAB 5.0",), refusal="a MATLAB file; export it as CSV"),
     Format("RTKLIB solution", suffixes=(".pos",), text=is_pos, gnss="vehnav.logs.pos:read_pos"),
+    Format("NMEA", suffixes=(".nmea",), text=is_nmea, gnss="vehnav.logs.nmea:read_nmea"),
+    Format("GPX", suffixes=(".gpx",), text=is_gpx, gnss="vehnav.logs.gpx:read_gpx"),
     Format(
         "CSV",
         suffixes=(".csv", ".txt", ".tsv", ".dat"),
         text=lambda _: True,
-        log="vehnav.logs.csv:read_csv",
+        log=CSV_READER,
         gnss="vehnav.logs.csv:read_csv_gnss",
         speed="vehnav.logs.csv:read_csv_speed",
     ),
@@ -184,7 +190,8 @@ def read_log(path: str, options: ReadOptions = DEFAULTS) -> Log:
     ----------
     path : str
     options : ReadOptions
-        ``gps_file`` and ``speed_file`` replace what the recording itself has.
+        ``gps_file`` and ``speed_file`` replace what the recording itself has. Beside a CSV
+        without GPS or speed, STEM.gps.csv and STEM.speed.csv are taken, with a finding.
 
     Returns
     -------
@@ -206,6 +213,8 @@ def read_log(path: str, options: ReadOptions = DEFAULTS) -> Log:
     else:
         raise _refuse(kind, path, "recording")
     findings = list(log.findings)
+    if kind.log == CSV_READER:
+        options = _with_siblings(path, log, options, findings)
     if options.gps_file is not None:
         beside, more = read_gnss(options.gps_file, _beside(options))
         log = replace(log, gnss=beside)
@@ -214,8 +223,27 @@ def read_log(path: str, options: ReadOptions = DEFAULTS) -> Log:
         speed, more = read_speed(options.speed_file, _beside(options))
         log = replace(log, speed=speed)
         findings += more
+    log = _dated(log, findings)
     log = _on_one_clock(log, options, findings)
     return replace(log, findings=tuple(findings))
+
+
+def _with_siblings(
+    path: str, log: Log, options: ReadOptions, findings: list[Finding]
+) -> ReadOptions:
+    """Options with the files that vehnav keeps beside a CSV: STEM.gps.csv and STEM.speed.csv."""
+    for field, what, there in (
+        ("gps_file", "gps", log.gnss is not None),
+        ("speed_file", "speed", log.speed is not None),
+    ):
+        beside = Path(path).with_suffix(f".{what}.csv")
+        if log.imu is None or there or getattr(options, field) is not None or not beside.is_file():
+            continue
+        findings.append(Finding(f"{what}-beside", "info", f"{path}: {what} taken from {beside}"))
+        gps = options.gps_file if what == "speed" else str(beside)
+        speed = options.speed_file if what == "gps" else str(beside)
+        options = replace(options, gps_file=gps, speed_file=speed)
+    return options
 
 
 def _beside(options: ReadOptions) -> ReadOptions:
@@ -267,11 +295,21 @@ def read_speed(path: str, options: ReadOptions = DEFAULTS) -> tuple[Speed, list[
     return log.speed, list(log.findings)
 
 
+def _dated(log: Log, findings: list[Finding]) -> Log:
+    """GPS without a date moved by whole days to the recording."""
+    undated = any(finding.code == "no-date" for finding in findings)
+    if not undated or log.imu is None or log.gnss is None or not log.unix_clock:
+        return log
+    days = round((int(log.imu.t_ns[0]) - int(log.gnss.t_ns[0])) / DAY_NS)
+    return replace(log, gnss=replace(log.gnss, t_ns=log.gnss.t_ns + days * DAY_NS))
+
+
 def _on_one_clock(log: Log, options: ReadOptions, findings: list[Finding]) -> Log:
     """GPS shifted as asked, and left out with a finding where it shares no time with the IMU."""
     if log.gnss is not None and options.gps_time_offset:
         shift = round(options.gps_time_offset / NS)
-        log = replace(log, gnss=replace(log.gnss, t_ns=log.gnss.t_ns + shift))
+        shifted = replace(log.gnss, t_ns=log.gnss.t_ns + shift)
+        log = replace(log, gnss=shifted, gps_time_offset=options.gps_time_offset)
     for name, label in (("gnss", "GPS"), ("speed", "speed")):
         record = getattr(log, name)
         if log.imu is None or record is None or not record.t_ns.size:
