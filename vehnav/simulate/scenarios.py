@@ -203,8 +203,8 @@ def paper002(*, seed: int = 1, road: float = 1.0, idle: float = 1.0) -> Motion:
         seed=seed,
         first_stop=100.0,
         last_stop=30.0,
-        stop_every=66.0,
-        half_size=2400.0,
+        stop_every=63.0,
+        half_size=2600.0,
         road=road,
         idle=idle,
     )
