@@ -159,3 +159,19 @@ def test_nothing_of_that_kind(tmp_path):
 def test_real_failed_recordings(shared_data):
     with pytest.raises(LogError, match="empty"):
         read_log(str(shared_data / "mcap_by_others" / "sarthak_zero_bytes.mcap"))
+
+
+def test_files_that_vehnav_keeps_beside_a_csv(tmp_path):
+    path = put(tmp_path / "city.csv", IMU)
+    put(tmp_path / "city.gps.csv", gps_text())
+    put(tmp_path / "city.speed.csv", "t_ns,speed_m_s\n1700000001000000000,3.5\n")
+    log = read_log(path)
+    assert log.gnss.t_ns.size == 11
+    assert log.speed.speed[0] == 3.5
+    assert [(f.code, f.level) for f in log.findings] == [
+        ("gps-beside", "info"),
+        ("speed-beside", "info"),
+    ]
+    other = put(tmp_path / "other.csv", gps_text(1_700_000_005))
+    named = read_log(path, ReadOptions(gps_file=other))
+    assert named.gnss.t_ns[0] == 1_700_000_005_000_000_000
