@@ -50,6 +50,12 @@ def scale(k: float, a: Vec3) -> Vec3:
 
 
 @kernel
+def dot(a: Vec3, b: Vec3) -> float:
+    """Scalar product of a and b."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@kernel
 def mat_vec(m: Mat3, v: Vec3) -> Vec3:
     """M v."""
     return (

@@ -28,7 +28,7 @@ from strapdown_motion import (
 
 from vehnav.earth import KRASOVSKY, WGS84
 from vehnav.rotation import angles_from_c_nb, c_nb_from_angles
-from vehnav.strapdown import enu
+from vehnav.strapdown import body_step, enu
 from vehnav.strapdown.enu import mechanize_enu
 from vehnav.strapdown.increments import Increments, increments_from_rates
 from vehnav.units import DEG
@@ -103,11 +103,11 @@ def test_rotated_increment_equals_quadrature_of_the_rotating_force():
     x, w = np.polynomial.legendre.leggauss(40)
     turned = Rotation.from_rotvec(np.outer(0.5 * (x + 1.0), theta)).apply(dvel)
     wanted = 0.5 * w @ turned
-    got = enu.rotated_velocity_increment(tuple(theta), tuple(dvel))
+    got = body_step.rotated_velocity_increment(tuple(theta), tuple(dvel))
     np.testing.assert_allclose(got, wanted, atol=1e-13)
     small = 1e-3 * theta  # the series branch
     turned = Rotation.from_rotvec(np.outer(0.5 * (x + 1.0), small)).apply(dvel)
-    got = enu.rotated_velocity_increment(tuple(small), tuple(dvel))
+    got = body_step.rotated_velocity_increment(tuple(small), tuple(dvel))
     np.testing.assert_allclose(got, 0.5 * w @ turned, atol=1e-15)
 
 
@@ -133,11 +133,11 @@ def test_coning_and_sculling_are_exact_to_their_order_for_linear_signals(ratio):
         theta, vel = a * h + b * h * h / 2, p * h + q * h * h / 2
         theta0 = (a * before - b * before**2 / 2) / ratio
         vel0 = (p * before - q * before**2 / 2) / ratio
-        c = enu.coning_factor(h, before)
-        phi = enu.rotation_vector(tuple(theta), tuple(theta0), c)
+        c = body_step.coning_factor(h, before)
+        phi = body_step.rotation_vector(tuple(theta), tuple(theta0), c)
         dv = np.add(
-            enu.rotated_velocity_increment(tuple(theta), tuple(vel)),
-            enu.sculling(tuple(theta), tuple(vel), tuple(theta0), tuple(vel0), c),
+            body_step.rotated_velocity_increment(tuple(theta), tuple(vel)),
+            body_step.sculling(tuple(theta), tuple(vel), tuple(theta0), tuple(vel0), c),
         )
         plain = np.linalg.norm(theta - turn.as_rotvec())
         return (

@@ -33,8 +33,13 @@ from vehnav.rotation import (
     dcm_from_rotvec,
     mat_mat,
     mat_vec,
-    rotation_coefficients,
     scale,
+)
+from vehnav.strapdown.body_step import (
+    coning_factor,
+    rotated_velocity_increment,
+    rotation_vector,
+    sculling,
 )
 from vehnav.strapdown.increments import Increments
 from vehnav.strapdown.solution import Solution as Solution
@@ -44,41 +49,6 @@ Array = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
 
 # ---- one equation each -------------------------------------------------------------------------
-
-
-@kernel
-def coning_factor(dt: float, dt_prev: float) -> float:
-    """Factor on the cross products of neighbouring increments: 1/12 for even steps.
-
-    dt_n / (6 (dt_n + dt_prev)), for previous increments scaled to dt_n; exact for a rate that is
-    linear in time over two uneven steps (spec A 3.2).
-    """
-    return dt / (6.0 * (dt + dt_prev))
-
-
-@kernel
-def rotation_vector(dtheta: Vec3, dtheta_prev: Vec3, c: float) -> Vec3:
-    """Phi, rad: rotation of the body over the step, with coning (000 eq. 12; spec A 5.4)."""
-    return add(dtheta, scale(c, cross(dtheta_prev, dtheta)))
-
-
-@kernel
-def rotated_velocity_increment(dtheta: Vec3, dvel: Vec3) -> Vec3:
-    """Velocity increment resolved in the body axes of the START of the step (000 eq. 16).
-
-    Exact for a specific force and a rate that are constant in body axes over the step.
-    """
-    theta2 = dtheta[0] * dtheta[0] + dtheta[1] * dtheta[1] + dtheta[2] * dtheta[2]
-    _, c, d = rotation_coefficients(theta2)
-    once = cross(dtheta, dvel)
-    twice = cross(dtheta, once)
-    return add(dvel, add(scale(c, once), scale(d, twice)))
-
-
-@kernel
-def sculling(dtheta: Vec3, dvel: Vec3, dtheta_prev: Vec3, dvel_prev: Vec3, c: float) -> Vec3:
-    """Velocity correction for rate and force that vary together, m/s (spec A 5.4)."""
-    return scale(c, add(cross(dtheta_prev, dvel), cross(dvel_prev, dtheta)))
 
 
 @kernel
