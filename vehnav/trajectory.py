@@ -96,16 +96,19 @@ def interpolate_positions(trajectory: Trajectory, t_ns: TimeArray) -> tuple[Arra
     h00, h10 = (1.0 + 2.0 * s) * (1.0 - s) ** 2, s * (1.0 - s) ** 2
     h01, h11 = s * s * (3.0 - 2.0 * s), s * s * (s - 1.0)
 
-    def hermite(x: Array, d0: Array, d1: Array) -> Array:
-        return np.asarray(h00 * x[k] + h10 * h * d0 + h01 * x[k + 1] + h11 * h * d1)
-
     r_lat = r_m + trajectory.height[k]
     r_lon = (r_n + trajectory.height[k]) * np.cos(lat0)
-    lon = np.unwrap(trajectory.lon) if trajectory.size else trajectory.lon
+
+    def hermite(x0: Array, x1: Array, d0: Array, d1: Array) -> Array:
+        return np.asarray(h00 * x0 + h10 * h * d0 + h01 * x1 + h11 * h * d1)
+
+    lat, lon, height = trajectory.lat, trajectory.lon, trajectory.height
+    d_lon = np.remainder(lon[k + 1] - lon[k] + np.pi, 2 * np.pi) - np.pi  # across 180 degrees
+    lon_t = hermite(lon[k], lon[k] + d_lon, v0[:, 0] / r_lon, v1[:, 0] / r_lon)
     return (
-        hermite(trajectory.lat, v0[:, 1] / r_lat, v1[:, 1] / r_lat),
-        np.remainder(hermite(lon, v0[:, 0] / r_lon, v1[:, 0] / r_lon) + np.pi, 2 * np.pi) - np.pi,
-        hermite(trajectory.height, v0[:, 2], v1[:, 2]),
+        hermite(lat[k], lat[k + 1], v0[:, 1] / r_lat, v1[:, 1] / r_lat),
+        np.remainder(lon_t + np.pi, 2 * np.pi) - np.pi,
+        hermite(height[k], height[k + 1], v0[:, 2], v1[:, 2]),
     )
 
 
