@@ -20,7 +20,7 @@ from typing import Final, Literal
 import numpy as np
 import numpy.typing as npt
 
-from vehnav.corrections import levelling_rate
+from vehnav.corrections import levelling_rate, velocity_reset
 from vehnav.earth import WGS84, Ellipsoid, c_en, ecef_from_geodetic, normal_gravity
 from vehnav.kernel import entry_kernel, kernel
 from vehnav.rotation import (
@@ -144,15 +144,30 @@ def eci_step(
 
 
 @kernel
+def carried(r: Vec3, v: Vec3, ground_new: Vec3, dt: float, earth: Ellipsoid) -> tuple[Vec3, Vec3]:
+    """Radius vector and velocity when the velocity over ground becomes ``ground_new``.
+
+    The vehicle turns with the Earth and moves over it by the mean of the two (trapezoid).
+    """
+    ground = subtract(v, earth_spin(r, earth))
+    back = turned_with_earth(ground_new, -dt, earth)
+    r_new = turned_with_earth(add(r, scale(0.5 * dt, add(ground, back))), dt, earth)
+    return r_new, add(ground_new, earth_spin(r_new, earth))
+
+
+@kernel
 def coasted(
     r: Vec3, v: Vec3, q: Quat, q_new: Quat, dt: float, earth: Ellipsoid
 ) -> tuple[Vec3, Vec3]:
     """Radius vector and velocity after a gap: the velocity over ground is held in body axes."""
     ground = subtract(v, earth_spin(r, earth))
-    ground_new = rotate(q_new, rotate_back(q, ground))
-    back = turned_with_earth(ground_new, -dt, earth)
-    r_new = turned_with_earth(add(r, scale(0.5 * dt, add(ground, back))), dt, earth)
-    return r_new, add(ground_new, earth_spin(r_new, earth))
+    return carried(r, v, rotate(q_new, rotate_back(q, ground)), dt, earth)
+
+
+@kernel
+def velocity_over_ground(r: Vec3, v: Vec3, earth: Ellipsoid) -> Vec3:
+    """East, north, up velocity, m/s: C_ni (V - Omega x R)."""
+    return mat_vec(local_frame(r, earth)[0], subtract(v, earth_spin(r, earth)))
 
 
 @kernel
@@ -222,7 +237,9 @@ def integrate_eci(
     dv_prev = (0.0, 0.0, 0.0)
     dt_prev = 0.0
     seen = -1
+    v_before = (0.0, 0.0, 0.0)
     for k in range(t.shape[0]):
+        stop = stop_id[k]
         turn = (0.0, 0.0, 0.0)
         if k > 0:
             dt = t[k] - t[k - 1]
@@ -243,22 +260,28 @@ def integrate_eci(
                 r_new, v_new = coasted(r, v, q, q_new, dt, earth)
             if clamp:
                 r_new, v_new = clamped(r_new, v_new, dt, height, earth)
+            if stop >= 0:
+                v_before = velocity_over_ground(r_new, v_new, earth)
+                if reset:
+                    r_new, v_new = carried(r, v, velocity_reset(), dt, earth)
             r, v, q = r_new, v_new, q_new
             th_prev = th
             dv_prev = dv
             dt_prev = 0.0 if coast[k - 1] else dt
-        frame, lat, h = local_frame(r, earth)
-        v_n = mat_vec(frame, subtract(v, earth_spin(r, earth)))
-        stop = stop_id[k]
+        elif stop >= 0:
+            v_before = velocity_over_ground(r, v, earth)
+            if reset:
+                v = earth_spin(r, earth)
         if stop >= 0:
             if stop != seen:
                 seen = stop
-                out_v_before[stop, 0], out_v_before[stop, 1], out_v_before[stop, 2] = v_n
+                out_v_before[stop, 0], out_v_before[stop, 1], out_v_before[stop, 2] = v_before
             out_tilt[stop, 0] += turn[0]
             out_tilt[stop, 1] += turn[1]
-            if reset:
-                v_n = (0.0, 0.0, 0.0)
-                v = earth_spin(r, earth)
+        frame, lat, h = local_frame(r, earth)
+        v_n = mat_vec(frame, subtract(v, earth_spin(r, earth)))
+        if reset and stop >= 0:
+            v_n = velocity_reset()  # free of the rounding of V - Omega x R
         out_inertial[k, 0], out_inertial[k, 1], out_inertial[k, 2] = r
         out_position[k, 0] = lat
         out_position[k, 1] = math.atan2(r[1], r[0]) - earth.omega_ie * (t[k] - t[0])
