@@ -20,6 +20,7 @@ from __future__ import annotations
 import copy
 import json
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
@@ -213,27 +214,37 @@ def print_findings(findings: Iterable[Finding], *, start_ns: int, least: Level =
 def progress(
     label: str, *, total: int | None = None, quiet: bool = False, after_s: float = 1.0
 ) -> Iterator[Callable[[int], None]]:
-    """A line on stderr for work that takes over a second: call the yielded function with the count.
+    """A line on stderr for work that takes over a second: the label, the time, and how far.
 
-    Nothing is printed unless stderr is a terminal. The line is taken away at the end.
+    Who can count calls the yielded function with the number done. Nothing is printed unless stderr
+    is a terminal; the line is taken away at the end.
     """
-    shown = not quiet and sys.stderr.isatty()
+    done: list[int] = []
+
+    def advance(number: int) -> None:
+        done[:] = [number]
+
+    if quiet or not sys.stderr.isatty():
+        yield advance
+        return
     start = time.monotonic()
-    last = start + after_s - 0.1
+    finished = threading.Event()
 
-    def advance(done: int) -> None:
-        nonlocal last
-        now = time.monotonic()
-        if not shown or now < last + 0.1:
-            return
-        last = now
-        part = f" {100 * done // total} %" if total else f" {done}"
-        sys.stderr.write(f"\r\x1b[K{label}{part}  {now - start:.0f} s")
-        sys.stderr.flush()
+    def show() -> None:
+        shown = not finished.wait(after_s)
+        while not finished.is_set():
+            part = "" if not done else f" {100 * done[0] // total} %" if total else f" {done[0]}"
+            sys.stderr.write(f"\r\x1b[K{label}{part}  {time.monotonic() - start:.0f} s")
+            sys.stderr.flush()
+            finished.wait(0.2)
+        if shown:
+            sys.stderr.write("\r\x1b[K")
+            sys.stderr.flush()
 
+    thread = threading.Thread(target=show, daemon=True)
+    thread.start()
     try:
         yield advance
     finally:
-        if shown and last > start + after_s - 0.1:
-            sys.stderr.write("\r\x1b[K")
-            sys.stderr.flush()
+        finished.set()
+        thread.join()
