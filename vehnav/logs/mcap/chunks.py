@@ -162,20 +162,24 @@ def indexed(data: Bytes, channel: int, entries: npt.NDArray[Any]) -> npt.NDArray
         return None
     heads = rec.heads_at(data, at)
     sound = _agree(data, channel, entries, at, heads)
-    ordered = np.sort(at)
-    if not sound.all() or (at.size > 1 and np.any(np.diff(ordered) < rec.MESSAGE_HEAD.itemsize)):
+    if not sound.all() or not (_apart(at) or _apart(np.sort(at))):
         return None
     return heads
+
+
+def _apart(at: Ints) -> bool:
+    """Whether each message begins behind the head of the one before it."""
+    return bool(np.all(at[1:] - at[:-1] >= rec.MESSAGE_HEAD.itemsize))
 
 
 def _agree(
     data: Bytes, channel: int, entries: npt.NDArray[Any], at: Ints, heads: npt.NDArray[Any]
 ) -> npt.NDArray[np.bool_]:
     """Which index entries point at a message of this channel and time that ends in the data."""
-    length = heads["length"]
+    length = np.minimum(heads["length"], np.uint64(1 << 62)).astype(np.int64)
     sound: npt.NDArray[np.bool_] = (heads["opcode"] == rec.MESSAGE) & (heads["channel"] == channel)
     sound &= (heads["log"] == entries["log"]) & (length >= rec.FIXED_MESSAGE)
-    sound &= (length <= data.size) & (at + 9 + length.astype(np.int64) <= data.size)
+    sound &= at + 9 + length <= data.size
     return sound
 
 

@@ -12,9 +12,8 @@ from vehnav.logs.mcap import chunks
 from vehnav.logs.mcap import records as rec
 from vehnav.logs.mcap.records import FIXED_MESSAGE, MESSAGE_HEAD, Channel, Schema
 from vehnav.logs.mcap.report import Report, signed
-from vehnav.logs.messages.decoder import Declaration
+from vehnav.logs.messages.payload import Batch, Declaration
 from vehnav.logs.messages.topics import State, Topic, Topics
-from vehnav.logs.messages.types import Batch
 
 
 class Delivery:
@@ -78,21 +77,35 @@ class Delivery:
             Whether they count as seen (False where the index has counted them already).
         """
         for channel_id in np.unique(heads["channel"]).tolist():
-            mine = heads["channel"] == channel_id
+            mine = np.flatnonzero(heads["channel"] == channel_id)
             topic = self.topic(channel_id)
             if topic is None:
-                self.unknown[channel_id] = self.unknown.get(channel_id, 0) + int(mine.sum())
+                self.unknown[channel_id] = self.unknown.get(channel_id, 0) + mine.size
                 continue
-            whole = bool(mine.all())
-            own = heads if whole else heads[mine]
-            log_ns = own["log"].astype(np.int64)
             if count:
-                topic.see(log_ns)
+                topic.see(heads["log"][mine].astype(np.int64))
+            if topic.unlearnt:
+                self.learn(topic, data, int(at[mine[0]]), heads[mine[0]])
             if topic.collectors:
-                start = (at if whole else at[mine]) + MESSAGE_HEAD.itemsize
-                size = own["length"].astype(np.int64) - FIXED_MESSAGE
-                publish_ns = own["publish"].astype(np.int64)
-                topic.add(Batch(data, start, size, log_ns, publish_ns), state)
+                topic.add(batch_of(data, at[mine], heads[mine]), state)
+
+    def learn(self, topic: Topic, data: npt.NDArray[np.uint8], at: int, head: np.void) -> None:
+        """Let a topic without schema learn from this message."""
+        end = at + 9 + int(head["length"])
+        self.topics.learn(topic, data[at + MESSAGE_HEAD.itemsize : end].tobytes())
+
+
+def batch_of(
+    data: npt.NDArray[np.uint8], at: npt.NDArray[np.int64], heads: npt.NDArray[Any]
+) -> Batch:
+    """Message records as payloads."""
+    return Batch(
+        data,
+        at + MESSAGE_HEAD.itemsize,
+        heads["length"].astype(np.int64) - FIXED_MESSAGE,
+        heads["log"].astype(np.int64),
+        heads["publish"].astype(np.int64),
+    )
 
 
 def deliver_chunk(

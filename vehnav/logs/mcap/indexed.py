@@ -17,7 +17,7 @@ import numpy.typing as npt
 from vehnav.errors import FormatError
 from vehnav.logs.mcap import chunks
 from vehnav.logs.mcap import records as rec
-from vehnav.logs.mcap.delivery import Delivery, deliver_chunk
+from vehnav.logs.mcap.delivery import Delivery, batch_of, deliver_chunk
 from vehnav.logs.mcap.records import ChunkIndex, Footer, Source
 from vehnav.logs.mcap.report import Report
 
@@ -180,6 +180,23 @@ def read_indexed(
                 wanted[channel] = entries
         if wanted:
             _read_chunk(source, chunk.place, wanted, delivery, report)
+        chunk.entries.clear()
+
+
+def learn_topics(source: Source, index: list[IndexedChunk], delivery: Delivery) -> None:
+    """Let topics without schema learn from their first messages."""
+    for chunk in index:
+        for channel, entries in chunk.entries.items():
+            topic = delivery.topic(channel)
+            if topic is None or not topic.unlearnt:
+                continue
+            try:
+                content = chunks.unpack(*_chunk_record(source, chunk.place))
+            except FormatError:
+                continue  # said when its messages are read
+            heads = chunks.indexed(content.data, channel, entries[:1])
+            if heads is not None:
+                delivery.learn(topic, content.data, int(entries["offset"][0]), heads[0])
 
 
 def _read_chunk(
@@ -202,10 +219,10 @@ def _read_chunk(
         return
     report.count(content.checksum)
     for channel, entries in wanted.items():
-        found = heads[channel]
-        if found is not None:
+        found, topic = heads[channel], delivery.topic(channel)
+        if found is not None and topic is not None:
             at = entries["offset"].astype(np.int64)
-            delivery.take(content.data, at, found, "sound", count=False)
+            topic.add(batch_of(content.data, at, found), "sound")
 
 
 def _chunk_record(source: Source, place: ChunkIndex) -> tuple[rec.ChunkHead, bytes]:

@@ -15,6 +15,7 @@ from vehnav.logs.mcap.delivery import Delivery
 from vehnav.logs.mcap.indexed import (
     IndexedChunk,
     Summary,
+    learn_topics,
     read_index,
     read_indexed,
     read_summary,
@@ -76,7 +77,7 @@ def _keep_pages() -> None:
 
     glibc raises its limit for that when a large block is freed; 5 times faster on many chunks.
     """
-    block = bytearray(WARM_BYTES - 1)
+    block = np.empty(WARM_BYTES - 4096, np.uint8)  # never touched: costs no memory
     del block
 
 
@@ -144,6 +145,8 @@ class _Reading:
             for file in with_data:
                 self._look(file)
             if all(file.index is not None for file in with_data):
+                for file in with_data:
+                    learn_topics(file.source, file.index or [], file.delivery)
                 self._choose()
             else:
                 self.topics.gather_all()
@@ -243,7 +246,7 @@ class _Seen:
             return False
         ends = np.array([log_ns.min(), log_ns.max()])
         self.parts.append((topic, log_ns.size, ends))
-        return bool(topic.roles)
+        return bool(topic.roles) or topic.unlearnt
 
     def commit(self) -> None:
         """Let them count."""

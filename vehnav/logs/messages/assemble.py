@@ -83,6 +83,10 @@ class Assembler:
 
     _unix = True
 
+    @property
+    def _used(self) -> set[str]:
+        return {name for topic in self.topics for name in topic.used_as}
+
     # --- one role each ---------------------------------------------------------------------------
 
     def _imu(self, candidate: Candidate) -> tuple[Imu, Clock]:
@@ -93,8 +97,8 @@ class Assembler:
         for name, values in (("angular rate", gyro), ("acceleration", accel)):
             if not np.any(values):
                 raise UnusableError(candidate, f"its {name} is zero throughout")
-        gyro = gyro * GYRO_UNITS.get(self.options.gyro_unit or "rad/s", 1.0)
-        accel = accel * ACCEL_UNITS.get(self.options.accel_unit or "m/s2", 1.0)
+        gyro = convert.scaled(gyro, GYRO_UNITS[self.options.gyro_unit or "rad/s"])
+        accel = convert.scaled(accel, ACCEL_UNITS[self.options.accel_unit or "m/s2"])
         try:
             imu, findings = clean_imu(
                 clock.t_ns,
@@ -113,10 +117,11 @@ class Assembler:
 
     def _gnss(self, candidate: Candidate, base: Clock | None) -> Gnss | None:
         _, columns = self._columns(candidate)
-        clock = self._on_base(candidate, self._clock(candidate, columns), columns, base)
+        clock = self._clock(candidate, columns)
+        t_ns = self._on_base(candidate, clock, columns, base)
         fixes = convert.fixes(columns, candidate.role)
         gnss, findings = clean_gnss(
-            clock,
+            t_ns,
             fixes.lat,
             fixes.lon,
             fixes.height,
@@ -127,13 +132,14 @@ class Assembler:
             where=f"{self.path}: {candidate.label}",
         )
         self.findings += findings
-        if base is None and gnss is not None:
-            self._unix = bool(gnss.t_ns[0] > 0)
+        if base is None:
+            self._unix = clock.unix
         return gnss
 
     def _speed(self, candidate: Candidate, base: Clock | None) -> Speed | None:
         _, columns = self._columns(candidate)
-        clock = self._on_base(candidate, self._clock(candidate, columns), columns, base)
+        clock = self._clock(candidate, columns)
+        t_ns = self._on_base(candidate, clock, columns, base)
         where = f"{self.path}: {candidate.label}"
         values, doubt = convert.forward_speed(columns, candidate.role)
         if doubt and not self.options.speed_topic:
@@ -141,8 +147,10 @@ class Assembler:
             self.findings.append(Finding("speed-rejected", "warning", text))
             candidate.topic.used_as.remove(choice.NAMES["speed"])
             return None
-        speed, findings = clean_speed(clock, values, source=candidate.label, where=where)
+        speed, findings = clean_speed(t_ns, values, source=candidate.label, where=where)
         self.findings += findings
+        if "IMU" not in self._used and "GPS" not in self._used:
+            self._unix = clock.unix
         return speed
 
     # --- shared ----------------------------------------------------------------------------------

@@ -26,6 +26,8 @@ Position = int | Ints
 
 MAX_FIXED_BYTES = 1 << 30
 """A fixed part larger than this is no message."""
+MAX_PARTS = 50_000
+"""Fields of one type, counted wherever they occur: definitions may double at every level."""
 MAX_ELEMENTS = 4096
 """Structures of varying size in one message that are stepped over; more: a bad message."""
 _EIGHT = np.arange(8, dtype=np.int64)
@@ -80,12 +82,16 @@ class Compiler:
     def __init__(self, wanted: dict[Path, tuple[str, int]], max_align: int) -> None:
         self.wanted = wanted
         self.max_align = max_align
+        self.left = MAX_PARTS
 
     def compile(self, root: Struct) -> tuple[Step, ...]:
         """Steps for a whole message."""
         return tuple(self._join(self._steps(root, ())))
 
     def _steps(self, kind: Type, path: Path) -> list[Step]:
+        self.left -= 1
+        if self.left < 0:
+            raise FormatError(f"a message type of more than {MAX_PARTS} fields is no message")
         if isinstance(kind, Scalar):
             return [self._numbers(kind, 1, path)]
         if isinstance(kind, Text):

@@ -20,8 +20,11 @@ MAX_ACROSS = 0.3
 
 def vector(columns: Columns, role: Role, name: str) -> Array:
     """(n, k) numbers of a quantity in SI."""
-    values = columns[name].astype(np.float64, copy=False)
-    factor = role.quantities[name].factor
+    return scaled(columns[name].astype(np.float64, copy=False), role.quantities[name].factor)
+
+
+def scaled(values: Array, factor: float) -> Array:
+    """Numbers times a factor, without a copy where it is 1."""
     return values if factor == 1.0 else values * factor
 
 

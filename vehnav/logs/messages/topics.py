@@ -10,13 +10,39 @@ import numpy as np
 import numpy.typing as npt
 
 from vehnav.errors import FormatError
-from vehnav.logs.messages.decoder import Declaration, Decoder, make_decoder, type_tree
+from vehnav.logs.messages.decoder import make_decoder, type_tree
+from vehnav.logs.messages.objects import learn_json
+from vehnav.logs.messages.payload import Batch, Declaration, Decoder
 from vehnav.logs.messages.roles import Role, find_roles
 from vehnav.logs.messages.stamps import Clock
-from vehnav.logs.messages.types import Batch, Struct
+from vehnav.logs.messages.types import Struct
 
 Ints = npt.NDArray[np.int64]
 State = Literal["sound", "unverified", "recovered"]
+
+
+class Column:
+    """Rows that come in batches, in one array: no second copy of them at the end."""
+
+    def __init__(self, first: npt.NDArray[Any], expected: int) -> None:
+        shape = (max(expected, len(first)), *first.shape[1:])
+        self._rows = np.empty(shape, first.dtype.newbyteorder("="))
+        self.size = 0
+        self.append(first)
+
+    def append(self, rows: npt.NDArray[Any]) -> None:
+        """More rows."""
+        end = self.size + len(rows)
+        if end > len(self._rows):
+            larger = np.empty((max(end, 3 * end // 2), *self._rows.shape[1:]), self._rows.dtype)
+            larger[: self.size] = self._rows[: self.size]
+            self._rows = larger
+        self._rows[self.size : end] = rows
+        self.size = end
+
+    def array(self) -> npt.NDArray[Any]:
+        """All rows."""
+        return self._rows[: self.size]
 
 
 @dataclass
@@ -25,6 +51,8 @@ class Collector:
 
     Attributes
     ----------
+    expected : int
+        Messages that will come, as far as known.
     read, recovered, unverified, bad : int
         Messages delivered; of these from damaged parts; from parts with a wrong checksum; and
         messages that do not agree with their schema.
@@ -33,7 +61,8 @@ class Collector:
 
     role: Role
     decoder: Decoder
-    parts: dict[str, list[npt.NDArray[Any]]] = field(default_factory=dict)
+    expected: int = 0
+    kept: dict[str, Column] = field(default_factory=dict)
     read: int = 0
     recovered: int = 0
     unverified: int = 0
@@ -60,22 +89,19 @@ class Collector:
             self.unverified_span = _widen(self.unverified_span, log_ns)
         columns = {"log": log_ns, "publish": batch.publish_ns if whole else batch.publish_ns[row]}
         for name, values in (columns | decoded.columns).items():
-            self.parts.setdefault(name, []).append(values)
+            if name in self.kept:
+                self.kept[name].append(values)
+            else:
+                self.kept[name] = Column(values, self.expected)
 
     def columns(self) -> dict[str, npt.NDArray[Any]]:
         """Everything kept, in order of log time; can be called once."""
-        joined = {name: _concatenate(self.parts.pop(name)) for name in list(self.parts)}
+        joined = {name: self.kept.pop(name).array() for name in list(self.kept)}
         log = joined.get("log")
         if log is not None and np.any(log[1:] < log[:-1]):
             order = np.argsort(log, kind="stable")
             joined = {name: values[order] for name, values in joined.items()}
         return joined
-
-
-def _concatenate(parts: list[npt.NDArray[Any]]) -> npt.NDArray[Any]:
-    whole = np.concatenate(parts)
-    parts.clear()
-    return whole.astype(whole.dtype.newbyteorder("="), copy=False)
 
 
 def _widen(span: tuple[int, int] | None, times: Ints) -> tuple[int, int]:
@@ -116,6 +142,16 @@ class Topic:
     clock: Clock | None = None
     used_as: list[str] = field(default_factory=list)
 
+    @property
+    def unlearnt(self) -> bool:
+        """Whether a first message must tell what the messages are like (JSON without schema)."""
+        return self.tree is not None and not self.tree.fields and self.declared.encoding == "json"
+
+    def learn(self, payload: bytes) -> None:
+        """Understand the topic by its first message."""
+        self.tree = learn_json(self.declared.type_name, payload)
+        self.roles = find_roles(self.tree)
+
     def see(self, log_ns: Ints, count: int | None = None) -> None:
         """Note messages of these log times."""
         self.count += log_ns.size if count is None else count
@@ -127,7 +163,7 @@ class Topic:
         if self.tree is None:
             raise ValueError(f"topic {self.name} is not understood")
         decoder = make_decoder(self.declared, self.tree, role.wanted())
-        collector = Collector(role, decoder)
+        collector = Collector(role, decoder, self.count)
         self.collectors.append(collector)
         return collector
 
@@ -148,6 +184,15 @@ class Topics:
         """Collect every role of every topic, also of those yet to come."""
         self._gather_new = True
         for topic in self:
+            self._gather(topic)
+
+    def learn(self, topic: Topic, payload: bytes) -> None:
+        """A first message of a topic that its schema does not explain."""
+        topic.learn(payload)
+        self._gather(topic)
+
+    def _gather(self, topic: Topic) -> None:
+        if self._gather_new:
             for role in topic.roles:
                 topic.gather(role)
 
@@ -165,7 +210,5 @@ class Topics:
             except FormatError as error:
                 topic.problem = str(error)
             self._topics[key] = topic
-            if self._gather_new:
-                for role in topic.roles:
-                    topic.gather(role)
+            self._gather(topic)
         return self._topics[key]

@@ -5,9 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
-import numpy as np
-import numpy.typing as npt
-
 Path = tuple[str, ...]
 """Field names from the root of a message to a leaf, spelt as in its schema."""
 
@@ -64,26 +61,6 @@ class Struct:
 
 
 Type = Scalar | Text | Array | Struct
-
-
-@dataclass(frozen=True)
-class Batch:
-    """Payloads of one channel lying in one buffer.
-
-    Attributes
-    ----------
-    data : (b,) uint8
-    start, size : (n,) int64
-        Where each payload begins in ``data``, and its bytes.
-    log_ns, publish_ns : (n,) int64
-        The recorder's and the sender's clock.
-    """
-
-    data: npt.NDArray[np.uint8]
-    start: npt.NDArray[np.int64]
-    size: npt.NDArray[np.int64]
-    log_ns: npt.NDArray[np.int64]
-    publish_ns: npt.NDArray[np.int64]
 
 
 def plain(name: str) -> str:
