@@ -134,15 +134,24 @@ def positions(
 
 
 def exact(
-    motion: Motion, t: Array, *, earth: Ellipsoid = WGS84, gravity_at: str = "reference"
+    motion: Motion,
+    t: Array,
+    *,
+    earth: Ellipsoid = WGS84,
+    gravity_at: str = "reference",
+    increments: bool = True,
 ) -> Truth:
-    """Truth of a motion at the instants ``t``."""
+    """Truth of a motion at the instants ``t``; without ``increments`` those are empty."""
     position, nodes, at_nodes, w, dt = positions(motion, t, earth=earth)
-    omega, f = ideal_sensors(
-        motion, nodes.ravel(), at_nodes.reshape(-1, 3), earth=earth, gravity_at=gravity_at
-    )
-    scaled = dt[:, None] * w
-    dtheta, dvel = (np.einsum("km,kmi->ki", scaled, y.reshape(*nodes.shape, 3)) for y in (omega, f))
+    dtheta = dvel = np.empty((0, 3))
+    if increments:
+        omega, f = ideal_sensors(
+            motion, nodes.ravel(), at_nodes.reshape(-1, 3), earth=earth, gravity_at=gravity_at
+        )
+        scaled = dt[:, None] * w
+        dtheta, dvel = (
+            np.einsum("km,kmi->ki", scaled, y.reshape(*nodes.shape, 3)) for y in (omega, f)
+        )
     omega, f = ideal_sensors(motion, t, position, earth=earth, gravity_at=gravity_at)
     c_nb = c_nb_from_angles(*motion.angles(t).T)
     return Truth(t, position, motion.v_n(t), c_nb, omega, f, dtheta, dvel)

@@ -188,3 +188,16 @@ def test_log_that_begins_in_a_stop_is_reset_at_once():
     )  # fmt: skip
     assert not solution.v_n.any()
     assert solution.v_before_reset[0].tolist() == [1.0, 2.0, 0.0]
+
+
+def test_part_of_a_log_keeps_the_numbers_of_its_stops():
+    """A part that begins after stop 0 still reports the velocity found at stop 1."""
+    truth = exact_truth(static(lat_deg=LAT), np.arange(0.0, 1.0, 0.01))
+    stop_id = np.full(truth.t.size, -1, dtype=np.int64)
+    stop_id[:20], stop_id[60:80] = 0, 1
+    control = StopControl(stop_id, np.zeros(truth.t.size - 1), True, 2).part(30, 90)
+    solution = mechanize_enu(
+        truth.increments().part(30, 90), position=tuple(truth.position[0]), v_n=(0.5, -0.25, 0.0),
+        c_nb=truth.c_nb[0], control=control,
+    )  # fmt: skip
+    np.testing.assert_allclose(solution.v_before_reset, [[0, 0, 0], [0.5, -0.25, 0]], atol=1e-4)
