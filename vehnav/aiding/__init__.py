@@ -1,0 +1,1 @@
+"""Aided navigation: error model, Kalman filter, measurements, smoother (paper 003 and beyond)."""
