@@ -2,26 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
 
-from vehnav.earth import local_enu, position_difference
 from vehnav.errors import Finding
-from vehnav.evaluation.diagnosis import check_place, clock_findings
-from vehnav.evaluation.matching import Interval, Matched, match
-from vehnav.evaluation.outages import MIN_DISTANCE, Outage, outage_errors
-from vehnav.evaluation.reference import course, path_distance
-from vehnav.evaluation.segments import Segment, segment_errors
+from vehnav.evaluation.align import Fit
+from vehnav.evaluation.calibration import Calibration
+from vehnav.evaluation.drift import Drift
+from vehnav.evaluation.outages import MIN_DISTANCE, Outage
+from vehnav.evaluation.segments import Segment
 from vehnav.evaluation.statistics import Statistics, statistics
-from vehnav.logs.log import Gnss
-from vehnav.rotation import angles_from_c_nb
+from vehnav.evaluation.time_offset import TimeOffset
 from vehnav.trajectory import Trajectory
-from vehnav.units import NS
 
 Array = npt.NDArray[np.float64]
 
@@ -55,12 +52,21 @@ class Errors:
         Standard deviations of the fixes, m, where the receiver gives them.
     time_offset : float
         s, added to the stamps of the GPS.
-    align : str
-        ``none``, or the alignment that was fitted to the reference before judging.
+    found_offset : TimeOffset or None
+        The offset that the motion itself suggests, on top of nothing; None where it was not asked
+        for or motion does not tell.
+    fit : Fit or None
+        The alignment to the reference before judging, if one was asked for.
     counts : mapping
         Fixes: total, judged, and why the others were not judged.
     segments : tuple of Segment
     outages : tuple of Outage
+    drift : Drift or None
+        Since the last correction; None where the trajectory has no stops.
+    calibration : Calibration or None
+        Of the trajectory's sigmas, where it has any.
+    poses : mapping
+        ``ape`` and ``rpe`` under evo's names.
     findings : tuple of Finding
         What was noticed about the pair of inputs.
     methods : mapping
@@ -85,10 +91,14 @@ class Errors:
     roll: Array | None = None
     reference_sigma: Array | None = None
     time_offset: float = 0.0
-    align: str = "none"
+    found_offset: TimeOffset | None = None
+    fit: Fit | None = None
     counts: Mapping[str, int] = field(default_factory=lambda: MappingProxyType({}))
     segments: tuple[Segment, ...] = ()
     outages: tuple[Outage, ...] = ()
+    drift: Drift | None = None
+    calibration: Calibration | None = None
+    poses: Mapping[str, Any] = field(default_factory=lambda: MappingProxyType({}))
     findings: tuple[Finding, ...] = ()
     methods: Mapping[str, Any] = field(default_factory=lambda: MappingProxyType({}))
 
@@ -146,142 +156,9 @@ class Errors:
             "reference_sigma_m": self.reference_sigma_m(),
             "segments": [s.to_dict() for s in self.segments],
             "outages": [o.to_dict() for o in self.outages],
-            "align": self.align,
+            "drift": None if self.drift is None else self.drift.to_dict(),
+            "calibration": None if self.calibration is None else self.calibration.to_dict(),
+            **self.poses,
+            "align": "none" if self.fit is None else self.fit.align,
             "methods": dict(self.methods),
         }
-
-
-def compare(
-    trajectory: Trajectory,
-    gnss: Gnss,
-    *,
-    judge_from_ns: int | None = None,
-    exclude: Sequence[Interval] = (),
-    time_offset: float = 0.0,
-    lever_arm: npt.ArrayLike | None = None,
-    c_nb_reference: Array | None = None,
-    outages: Sequence[Interval] = (),
-    start_ns: int | None = None,
-) -> Errors:
-    """Judge a trajectory by GPS or truth.
-
-    Parameters
-    ----------
-    trajectory : Trajectory
-    gnss : Gnss
-        The reference: m fixes.
-    judge_from_ns : int or None
-        Earlier fixes do not judge (the window that GPS was used in), nor does their distance
-        count.
-    exclude : sequence of (int, int)
-        Intervals whose fixes do not judge, ns, both ends included.
-    time_offset : float
-        s, added to the stamps of the GPS: minus its delay.
-    lever_arm : (3,) or None
-        Antenna from the vehicle's point, m right-forward-up.
-    c_nb_reference : (m, 3, 3) or None
-        Attitude of the reference at its fixes, where it has one.
-    outages : sequence of (int, int)
-        Intervals without GPS for the trajectory, ns, judged one by one.
-    start_ns : int or None
-        Where the seconds of the outages count from; None: the start of the trajectory.
-
-    Returns
-    -------
-    Errors
-
-    Raises
-    ------
-    LogError
-        No overlap in time, never closer than 5 km, fewer than three fixes to judge by.
-    """
-    gnss = replace(gnss, t_ns=gnss.t_ns + np.int64(round(time_offset * 1e9)))
-    matched = match(
-        trajectory, gnss, judge_from_ns=judge_from_ns, exclude=exclude, lever_arm=lever_arm
-    )
-    judged = fixes(gnss, matched.index)
-    check_place(matched.states.lat, matched.states.lon, judged)
-    since = gnss.t_ns[0] if judge_from_ns is None else judge_from_ns
-    since = max(int(since), int(trajectory.t_ns[0]))
-    errors = _error_series(matched, judged, gnss, since_ns=since)
-    c_ref = None if c_nb_reference is None else c_nb_reference[matched.index]
-    errors = _with_attitude(errors, c_ref)
-    return replace(
-        errors,
-        time_offset=time_offset,
-        findings=clock_findings(trajectory, gnss),
-        segments=_segments(errors, c_ref),
-        outages=outage_errors(
-            errors.t_ns,
-            errors.horizontal,
-            errors.distance,
-            outages,
-            start_ns=int(trajectory.t_ns[0]) if start_ns is None else start_ns,
-        ),
-    )
-
-
-def fixes(gnss: Gnss, index: npt.NDArray[np.int64]) -> Gnss:
-    """Some of the fixes."""
-    return replace(
-        gnss,
-        t_ns=gnss.t_ns[index],
-        lat=gnss.lat[index],
-        lon=gnss.lon[index],
-        height=gnss.height[index],
-        v_n=None if gnss.v_n is None else gnss.v_n[index],
-        sigma_pos=None if gnss.sigma_pos is None else gnss.sigma_pos[index],
-        sigma_vel=None if gnss.sigma_vel is None else gnss.sigma_vel[index],
-    )
-
-
-def _error_series(matched: Matched, judged: Gnss, gnss: Gnss, *, since_ns: int) -> Errors:
-    """Position and velocity errors; along and cross by the course of the whole reference."""
-    states = matched.states
-    east, north = position_difference(
-        states.lat, states.lon, judged.lat, judged.lon, judged.height
-    ).T
-    way = course(gnss)[matched.index]
-    path = path_distance(gnss)
-    start = float(np.interp((since_ns - gnss.t_ns[0]) * NS, (gnss.t_ns - gnss.t_ns[0]) * NS, path))
-    return Errors(
-        t_ns=judged.t_ns,
-        lat=judged.lat,
-        lon=judged.lon,
-        height=judged.height,
-        states=states,
-        east=east,
-        north=north,
-        up=states.height - judged.height,
-        along=east * np.sin(way) + north * np.cos(way),
-        cross=east * np.cos(way) - north * np.sin(way),
-        distance=np.maximum(path[matched.index] - start, 0.0),
-        course=way,
-        velocity=None if judged.v_n is None else states.v_n - judged.v_n,
-        reference_sigma=judged.sigma_pos,
-        counts=MappingProxyType(matched.counts),
-    )
-
-
-def _with_attitude(errors: Errors, c_ref: Array | None) -> Errors:
-    """Heading, pitch and roll errors, wrapped to +-180 degrees."""
-    if c_ref is None:
-        return errors
-    own, ref = angles_from_c_nb(errors.states.c_nb), angles_from_c_nb(c_ref)
-    heading, pitch, roll = (
-        np.remainder(a - b + np.pi, 2.0 * np.pi) - np.pi for a, b in zip(own, ref, strict=True)
-    )
-    return replace(errors, heading=heading, pitch=pitch, roll=roll)
-
-
-def _segments(errors: Errors, c_ref: Array | None) -> tuple[Segment, ...]:
-    """KITTI segments in the tangent plane at the first judged fix."""
-    origin = (float(errors.lat[0]), float(errors.lon[0]), float(errors.height[0]))
-    return segment_errors(
-        (errors.t_ns - errors.t_ns[0]) * NS,
-        errors.distance,
-        errors.states.enu(origin),
-        local_enu(errors.lat, errors.lon, errors.height, origin=origin),
-        c_nb=None if c_ref is None else errors.states.c_nb,
-        c_nb_reference=c_ref,
-    )

@@ -21,6 +21,8 @@ Interval = tuple[int, int]
 
 MIN_FIXES: Final = 3
 """Fewer say nothing about a track."""
+UNCERTAIN: Final = 10.0
+"""m, and times the median: a fix whose own sigma exceeds both does not judge."""
 LONG_GAP_NS: Final = 1_000_000_000
 """ns: a step of the trajectory above it, and above 2.5 of its median steps, is not bridged."""
 
@@ -37,7 +39,8 @@ class Matched:
         Which fixes of the receiver they are.
     counts : dict of str to int
         ``total``, ``judged``, and why the others are not: ``outside`` the trajectory,
-        ``before`` judging starts, ``excluded`` by interval, ``in_gaps`` of the trajectory.
+        ``before`` judging starts, ``excluded`` by interval, ``uncertain`` by their own sigma,
+        ``in_gaps`` of the trajectory.
     """
 
     states: Trajectory
@@ -62,6 +65,14 @@ def in_long_gaps(t_ns: npt.NDArray[np.int64], clock: npt.NDArray[np.int64]) -> B
     return np.asarray((step[k] > limit) & ~at_an_end)
 
 
+def uncertain(gnss: Gnss) -> BoolArray:
+    """(m,) fixes that the receiver itself calls bad: sigma over 10 m and over 10 medians."""
+    if gnss.sigma_pos is None:
+        return np.zeros(gnss.t_ns.size, bool)
+    sigma = np.hypot(gnss.sigma_pos[:, 0], gnss.sigma_pos[:, 1])
+    return np.asarray(sigma > max(UNCERTAIN, UNCERTAIN * float(np.median(sigma))))
+
+
 def match(
     trajectory: Trajectory,
     gnss: Gnss,
@@ -81,14 +92,16 @@ def match(
     outside = (t < trajectory.t_ns[0]) | (t > trajectory.t_ns[-1])
     before = ~outside & (t < judge_from_ns if judge_from_ns is not None else np.zeros(t.size, bool))
     excluded = ~outside & ~before & in_intervals(t, exclude)
-    gaps = ~outside & ~before & ~excluded & in_long_gaps(t, trajectory.t_ns)
-    index = np.flatnonzero(~(outside | before | excluded | gaps))
+    doubtful = ~outside & ~before & ~excluded & uncertain(gnss)
+    gaps = ~outside & ~before & ~excluded & ~doubtful & in_long_gaps(t, trajectory.t_ns)
+    index = np.flatnonzero(~(outside | before | excluded | doubtful | gaps))
     counts = {
         "total": int(t.size),
         "judged": int(index.size),
         "outside": int(outside.sum()),
         "before": int(before.sum()),
         "excluded": int(excluded.sum()),
+        "uncertain": int(doubtful.sum()),
         "in_gaps": int(gaps.sum()),
     }
     if index.size < MIN_FIXES:
@@ -96,7 +109,8 @@ def match(
             f"only {index.size} GPS fixes can judge the trajectory, at least {MIN_FIXES} are "
             f"needed: of {counts['total']} lie {counts['outside']} outside its time span, "
             f"{counts['before']} before judging starts, {counts['excluded']} in excluded "
-            f"intervals, {counts['in_gaps']} in gaps of the trajectory"
+            f"intervals, {counts['uncertain']} are uncertain by their own sigma, "
+            f"{counts['in_gaps']} in gaps of the trajectory"
         )
     states = interpolate(trajectory, t[index])
     if lever_arm is not None:

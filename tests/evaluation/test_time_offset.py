@@ -1,0 +1,97 @@
+"""The delay of a receiver found from the motion, on drives where it is known."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from drives import gnss_of, trajectory_of
+
+from vehnav.evaluation import compare
+from vehnav.evaluation.time_offset import TimeOffset, estimate_time_offset
+from vehnav.logs.log import Gnss
+from vehnav.trajectory import Trajectory
+
+DURATION = 480.0
+
+
+def path(t: np.ndarray, speed: np.ndarray, heading: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    v = np.column_stack([speed * np.sin(heading), speed * np.cos(heading), 0.0 * t])
+    return np.cumsum(v, axis=0) * (t[1] - t[0]), v
+
+
+def city(seed: int, lag: float, noise: float = 1.0) -> tuple[Trajectory, Gnss]:
+    """Eight minutes of stop and go with bends; the estimate drifts, the receiver is late and noisy.
+
+    Heading 2 deg off and walking 0.02 deg/sqrt(s), velocity error growing at 0.01 m/s2 (1 sigma)
+    between stops; GPS noise with a correlation time of 30 s, 0.1 m white on top, 1 Hz.
+    """
+    rng = np.random.default_rng(seed)
+    t = np.arange(0.0, DURATION, 0.05)
+    knots = np.arange(0.0, DURATION + 20.0, 10.0)
+    speed = np.interp(t, knots, np.clip(rng.uniform(-4.0, 14.0, knots.size), 0.0, None))
+    bends = rng.choice([0.0, 0.0, 0.0, 1.0, -1.0], knots.size) * rng.uniform(0.03, 0.12, knots.size)
+    heading = np.cumsum(np.interp(t, knots, bends)) * 0.05
+    truth, _ = path(t, speed, heading)
+    walk = np.cumsum(rng.normal(0.0, np.radians(0.02) * np.sqrt(0.05), t.size))
+    estimate, v = path(t, speed, heading + np.radians(2.0) + walk)
+    bias = np.append(rng.normal(0.0, 0.01, 2), 0.0)
+    last_stop = np.maximum.accumulate(np.where(speed < 0.05, t, 0.0))
+    v_error = np.outer(t - last_stop, bias)
+    estimate = estimate + np.cumsum(v_error, axis=0) * 0.05
+    at = np.arange(0.0, DURATION - 1.0)
+    fixes = np.column_stack([np.interp(at, t, truth[:, k]) for k in range(3)])
+    share = np.exp(-1.0 / 30.0)
+    slow = np.zeros_like(fixes)
+    for k in range(1, at.size):
+        slow[k] = share * slow[k - 1] + np.sqrt(1.0 - share**2) * rng.normal(0.0, noise, 3)
+    fixes += slow + rng.normal(0.0, 0.1, fixes.shape)
+    return trajectory_of(t, estimate, v + v_error, heading + walk), gnss_of(at + lag, fixes)
+
+
+@pytest.mark.parametrize("lag", [0.6, -0.2])
+def test_delay_is_found_with_an_honest_sigma(lag: float) -> None:
+    """Six drives: 0.1 s rms (1 m at 10 m/s, the noise), and as its sigmas say (chi-square)."""
+    found = [estimate_time_offset(*city(seed, lag)) for seed in range(6)]
+    assert all(isinstance(f, TimeOffset) for f in found)
+    error = np.array([f.offset + lag for f in found if f])
+    normalised = np.array([(f.offset + lag) / f.sigma for f in found if f])
+    assert np.abs(error).max() < 0.3
+    assert np.sqrt(np.mean(error**2)) < 0.1
+    # chi-square of 6 degrees: below 16.8 with 99 %, above 0.87 with 99 %
+    assert 0.87 < np.sum(normalised**2) < 16.8
+
+
+def test_it_is_reported_but_applied_only_on_request() -> None:
+    trajectory, gnss = city(1, 0.6)
+    plain = compare(trajectory, gnss)
+    assert plain.time_offset == 0.0
+    assert plain.found_offset is None
+    told = compare(trajectory, gnss, estimate_offset=True)
+    assert told.time_offset == 0.0
+    assert told.found_offset is not None
+    (finding,) = told.findings
+    assert finding.code == "gps-delay"
+    assert "late" in finding.text
+    applied = compare(trajectory, gnss, time_offset="auto")
+    assert applied.time_offset == pytest.approx(-0.6, abs=0.15)
+    assert applied.findings == ()
+    assert applied.horizontal[0] < 1.0 < plain.horizontal[0]  # before drift: 0.6 s of driving
+
+
+def test_steady_motion_tells_nothing() -> None:
+    t = np.arange(0.0, 600.0, 0.1)
+    east = np.column_stack([20.0 * t, 0 * t, 0 * t])
+    v = np.column_stack([20.0 + 0 * t, 0 * t, 0 * t])
+    trajectory = trajectory_of(t, east, v, 0 * t + np.pi / 2)
+    rng = np.random.default_rng(5)
+    gnss = gnss_of(t[::10] + 0.5, east[::10] + rng.normal(0.0, 1.0, east[::10].shape))
+    assert estimate_time_offset(trajectory, gnss) is None
+    errors = compare(trajectory, gnss, time_offset="auto")
+    assert errors.time_offset == 0.0
+    assert [f.code for f in errors.findings] == ["gps-delay"]
+
+
+def test_too_short_tells_nothing() -> None:
+    trajectory, gnss = city(1, 0.6)
+    short = Gnss(gnss.t_ns[:60], gnss.lat[:60], gnss.lon[:60], gnss.height[:60])
+    assert estimate_time_offset(trajectory, short) is None
