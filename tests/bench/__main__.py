@@ -8,8 +8,12 @@ from __future__ import annotations
 import importlib
 import platform
 import sys
+from pathlib import Path
 
-BENCHES = ("help", "kernel", "run")
+BENCHES = sorted(
+    path.stem.removeprefix("bench_") for path in Path(__file__).parent.glob("bench_*.py")
+)
+"""Every ``bench_NAME.py`` here; its ``main`` prints, and returns whether the results agree."""
 
 
 def main() -> int:

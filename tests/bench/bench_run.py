@@ -19,15 +19,17 @@ RATE_HZ = 200.0
 
 STEPS = {
     "read": ["vehnav.logs.read:read_log"],
+    "prepare": ["vehnav.prepare:prepare_samples"],
     "stops": ["vehnav.stops:stop_statistics", "vehnav.stops:stops_from_statistics"],
     "integrate": ["vehnav.strapdown.enu:mechanize_enu"],
-    "errors": ["vehnav.evaluation.errors:compare"],
+    "correct": ["vehnav.offline:run_stops"],
+    "errors": ["vehnav.evaluation:compare"],
     "write": [
         "vehnav.export.formats:write_trajectory",
         "vehnav.report.document:write_document",
     ],
 }
-"""Step -> functions whose time it is (the outermost one counts)."""
+"""Step -> functions whose time it is, without that of other steps inside them."""
 
 
 class Stopwatch:
@@ -36,20 +38,26 @@ class Stopwatch:
     def __init__(self) -> None:
         self.seconds = dict.fromkeys(STEPS, 0.0)
         self.calls = dict.fromkeys(STEPS, 0)
-        self.inside = False
+        self.stack: list[str] = []
+        self.since = 0.0
+
+    def turn(self) -> None:
+        """Book the time since the last turn on the step that is running."""
+        now = time.perf_counter()
+        if self.stack:
+            self.seconds[self.stack[-1]] += now - self.since
+        self.since = now
 
     def timed(self, step: str, func: Callable[..., Any]) -> Callable[..., Any]:
         @functools.wraps(func)
         def wrapper(*args: Any, **kwargs: Any) -> Any:
-            if self.inside:
-                return func(*args, **kwargs)
-            self.inside = True
-            start = time.perf_counter()
+            self.turn()
+            self.stack.append(step)
             try:
                 return func(*args, **kwargs)
             finally:
-                self.inside = False
-                self.seconds[step] += time.perf_counter() - start
+                self.turn()
+                self.stack.pop()
                 self.calls[step] += 1
 
         return wrapper
