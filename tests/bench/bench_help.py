@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import statistics
 import subprocess
 import sys
@@ -11,18 +12,26 @@ LIMIT_S = 0.15
 REPEATS = 15
 
 
+def clock() -> float:
+    """Processor time of the finished children, which a busy machine does not stretch."""
+    used = os.times()
+    children = used.children_user + used.children_system
+    return children if children else time.perf_counter()  # Windows does not tell
+
+
 def seconds(*args: str) -> float:
-    start = time.perf_counter()
+    start = clock()
     subprocess.run([sys.executable, *args], check=True, stdout=subprocess.DEVNULL)
-    return time.perf_counter() - start
+    return clock() - start
 
 
 def main() -> bool:
-    """Print the medians; alternating, so that a busy machine slows both."""
+    """Print the medians; alternating, so that what slows one slows the other."""
+    seconds("-m", "vehnav", "--help")
     pairs = [(seconds("-c", "pass"), seconds("-m", "vehnav", "--help")) for _ in range(REPEATS)]
     bare = statistics.median(pair[0] for pair in pairs)
     extra = statistics.median(pair[1] - pair[0] for pair in pairs)
-    print(f"bare python                       {bare:8.3f} s")
+    print(f"bare python                       {bare:8.3f} s of processor time")
     print(f"vehnav --help, more than that     {extra:8.3f} s  (wanted: at most {LIMIT_S})")
     return True
 
