@@ -11,7 +11,7 @@ from vehnav.evaluation.time_offset import TimeOffset, estimate_time_offset
 from vehnav.logs.log import Gnss
 from vehnav.trajectory import Trajectory
 
-DURATION = 480.0
+DURATION = 600.0
 
 
 def path(t: np.ndarray, speed: np.ndarray, heading: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -20,7 +20,7 @@ def path(t: np.ndarray, speed: np.ndarray, heading: np.ndarray) -> tuple[np.ndar
 
 
 def city(seed: int, lag: float, noise: float = 1.0) -> tuple[Trajectory, Gnss]:
-    """Eight minutes of stop and go with bends; the estimate drifts, the receiver is late and noisy.
+    """Ten minutes of stop and go with bends; the estimate drifts, the receiver is late and noisy.
 
     Heading 2 deg off and walking 0.02 deg/sqrt(s), velocity error growing at 0.01 m/s2 (1 sigma)
     between stops; GPS noise with a correlation time of 30 s, 0.1 m white on top, 1 Hz.

@@ -35,6 +35,8 @@ MIN_FIXES: Final = 15
 MIN_WINDOWS: Final = 4
 """To say how far they scatter."""
 ITERATIONS: Final = 8
+MIN_EFFECTIVE: Final = 3.0
+"""Windows after weighting: 1 / sum of squared shares."""
 SHARPEST: Final = 1e-3
 """s: no window is believed more than this."""
 SCATTER_FACTOR: Final = 1.5
@@ -211,10 +213,12 @@ def _vote(windows: list[_Window], offset: float) -> TimeOffset | None:
         mean = float(np.sum(huber * x) / np.sum(huber))
     share = huber / np.sum(huber)
     effective = 1.0 / float(np.sum(share**2))
-    if effective < 0.5 * MIN_WINDOWS:
+    if effective < MIN_EFFECTIVE:
         return None
-    scatter = float(np.sqrt(np.sum((share * (x - mean)) ** 2) * effective / (effective - 1.0)))
-    return TimeOffset(mean, max(SCATTER_FACTOR * scatter, SHARPEST), len(own))
+    # few windows may agree by chance: the variance of Student's t, and the residuals' own say
+    scatter2 = float(np.sum((share * (x - mean)) ** 2)) * effective / (effective - 2.0)
+    formal2 = 1.0 / float(np.sum(huber))
+    return TimeOffset(mean, SCATTER_FACTOR * float(np.sqrt(scatter2 + formal2)), len(own))
 
 
 def _weighted_median(x: Array, w: Array) -> float:
