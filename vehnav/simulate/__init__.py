@@ -20,7 +20,7 @@ from vehnav.simulate.generate import (
 from vehnav.simulate.receivers import GnssModel, WheelModel
 from vehnav.simulate.scenarios import SCENARIOS, Scenario, make_scenario, scenario_parameters
 from vehnav.simulate.truth import inertial_states
-from vehnav.simulate.write import write_log
+from vehnav.simulate.write import write_log, write_runs
 
 __all__ = [
     "SCENARIOS",
@@ -38,4 +38,5 @@ __all__ = [
     "simulate_runs",
     "stamps",
     "write_log",
+    "write_runs",
 ]

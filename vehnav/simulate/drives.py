@@ -11,6 +11,9 @@ from vehnav.errors import ConfigError
 from vehnav.simulate.program import STEP_PEAK, Program, ProgramBuilder
 from vehnav.units import DEG
 
+_ENDS = 16.0
+"""s for the speed changes and the corner of a block, at most, and the last braking."""
+
 
 @dataclass(frozen=True)
 class CityHabits:
@@ -70,27 +73,33 @@ class CityDriver:
         """Stand, drive, stand; the last stop fills what is left of the duration."""
         self.way.hold(first_stop)
         self._plan_stop()
-        while self.way.elapsed + self._longest_leg() + last_stop < duration:
-            self._block()
+        while True:
+            left = duration - last_stop - self.way.elapsed
+            longest = (left - _ENDS) * self.habits.limits[0]
+            if longest < self.habits.block[0]:
+                break
+            self._block(min(longest, self.habits.block[1]), left)
         if self.way.speed > 0.0:
             self.way.change_speed(0.0, peak=self.habits.brake, grade=0.0)
         fill(self.way, duration)
-        return self.way.build()
-
-    def _longest_leg(self) -> float:
-        """Upper bound of what a block and the last braking take, s."""
-        h = self.habits
-        return h.block[1] / h.limits[0] + 22.0
+        program = self.way.build()
+        if program.distance == 0.0:
+            raise ConfigError(f"{duration:g} s leave no time to drive; lengthen the scenario")
+        return program
 
     def _plan_stop(self) -> None:
         self.next_stop = self.way.elapsed + self.habits.stop_every * self.rng.uniform(0.55, 1.45)
 
-    def _block(self) -> None:
-        """One block: speed up, drive, perhaps bend, slow down; perhaps stop; perhaps turn."""
+    def _block(self, longest: float, left: float) -> None:
+        """One block: speed up, drive, perhaps bend, slow down; perhaps stop; perhaps turn.
+
+        ``longest`` m, and ``left`` s of the drive.
+        """
         rng, h = self.rng, self.habits
-        length = rng.uniform(*h.block)
+        length = rng.uniform(h.block[0], longest)
         turn = self._choose_turn(length)
-        stops = self.way.elapsed + length / 9.0 > self.next_stop
+        needed = length / h.limits[0] + 2.0 * _ENDS + h.stop_length[1]
+        stops = self.way.elapsed + length / 9.0 > self.next_stop and needed < left
         end = 0.0 if stops else (h.turn_speed if turn else float(rng.choice(h.limits)) * 0.8)
         self._straight(length, end)
         if stops:
@@ -191,25 +200,21 @@ def motorway_program(
     stop_every: float,
     heading: float,
 ) -> Program:
-    """Long bends and small changes of speed; with ``stop_every`` (s, 0: never) lights on the way.
+    """Long bends and small changes of speed; about each ``stop_every`` s (0: never) a stop.
 
     It begins and ends standing.
     """
     way = ProgramBuilder(heading=heading).hold(first_stop)
-    brake = STEP_PEAK * 1.1 * speed / 1.5
-    while True:
+    legs = max(1, round((duration - first_stop) / stop_every)) if stop_every > 0.0 else 1
+    slot = (duration - first_stop) / legs
+    for k in range(1, legs + 1):
+        begin_braking = first_stop + k * slot - rng.uniform(12.0, 25.0) - STEP_PEAK * speed / 1.4
         way.change_speed(speed, peak=1.8)
-        end = duration - 20.0 - brake
-        if stop_every > 0.0:
-            end = min(end, way.elapsed + stop_every * rng.uniform(0.7, 1.1))
-        while way.elapsed + 50.0 < end:
+        while way.elapsed + 50.0 < begin_braking:
             _cruise(way, rng, speed)
-        way.hold(max(end - way.elapsed, 0.0))
+        fill(way, begin_braking)
         way.change_speed(0.0, peak=1.5, grade=0.0)
-        if stop_every == 0.0 or way.elapsed + stop_every + 3.0 * brake > duration:
-            break
-        way.hold(rng.uniform(10.0, 25.0))
-    fill(way, duration)
+        fill(way, first_stop + k * slot)
     return way.build()
 
 

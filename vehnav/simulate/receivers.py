@@ -71,6 +71,14 @@ class WheelModel:
     quantisation: float = 0.01
 
 
+def repeated_outages(
+    *, every: float, length: float, start: float, duration: float
+) -> tuple[tuple[float, float], ...]:
+    """Outages of ``length`` s, one each ``every`` s from ``start`` on, within ``duration`` s."""
+    count = max(0, int(np.ceil((duration - start) / every)))
+    return tuple((start + k * every, start + k * every + length) for k in range(count))
+
+
 def epochs(truth: Trajectory, *, rate_hz: float, delay: float = 0.0) -> TimeArray:
     """(m,) int64 ns: evenly from the start of the truth to ``delay`` s before its end."""
     span = (int(truth.t_ns[-1]) - int(truth.t_ns[0])) * NS - delay

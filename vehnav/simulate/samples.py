@@ -42,7 +42,7 @@ class Sample:
 SAMPLES: Final = (
     Sample(
         files=("city.mcap", "city.csv"),
-        scenario="city,duration=300,seed=7,first_stop=40,stop_every=60",
+        scenario="city,duration=300,seed=26,first_stop=30,last_stop=15,stop_every=52",
         sensor="mems-industrial",
         seed=7,
         rate_hz=100.0,
