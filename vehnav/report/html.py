@@ -1,0 +1,133 @@
+"""The report of a run as one self-contained page: opens offline, carries no link to anywhere."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+from collections.abc import Mapping
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+from vehnav._version import __version__
+from vehnav.export.atomic import atomic_path
+from vehnav.pipeline import Run
+from vehnav.report import sections
+from vehnav.report.figures import panels
+from vehnav.report.mapping import map_of
+from vehnav.report.markup import esc
+from vehnav.report.svg import map_figure, panel
+
+
+def write_html(
+    run: Run, document: Mapping[str, Any], path: Path, *, command: str | None = None
+) -> None:
+    """Write :func:`render_html` whole or not at all."""
+    page = render_html(run, document, command=command)
+    with atomic_path(path) as temporary:
+        temporary.write_text(page, encoding="utf-8")
+
+
+def render_html(run: Run, document: Mapping[str, Any], *, command: str | None = None) -> str:
+    """The page of a run.
+
+    Parameters
+    ----------
+    run : Run
+        Its arrays are what is drawn.
+    document : mapping
+        Of :func:`vehnav.report.document.document`: what the tables say.
+    command : str or None
+        The command line that made it; None: put together from the configuration.
+    """
+    repeat = command or sections.command_line(run.log.path, run.config)
+    body = [
+        _header(run, document),
+        f'<main><div class="linked"><div class="left">{map_figure(map_of(run))}</div>'
+        f'<div class="right">{_panels(run)}</div></div>',
+        _section("methods", "Methods compared", sections.methods_table(run), METHODS_NOTE),
+        _section("stops", "What each stop corrected", sections.stops_table(document), STOPS_NOTE),
+        _section("findings", "Findings", sections.findings_list(document)),
+        _section("start", "Start and use of GPS", sections.start_details(run, document)),
+        _section("input", "Recording", sections.input_details(document)),
+        _section("repeat", "How to repeat it", _repeat(repeat, document)),
+        "</main>",
+    ]
+    return _page(sections.title(run), "".join(body))
+
+
+METHODS_NOTE = (
+    "The same fixes judge every method; the start is the same for all. <em>Levelling</em> turns "
+    "the platform level while the vehicle stands, <em>velocity reset</em> sets its velocity to "
+    "zero: the two procedures as published. The default adds the gyro bias that every stop shows "
+    "and distributes over each leg what its ends found."
+)
+STOPS_NOTE = (
+    "<em>Speed before reset</em> is what the velocity had drifted to when the vehicle stood again. "
+    "<em>Of threshold</em>: how near the stop came to not being one."
+)
+
+
+def _panels(run: Run) -> str:
+    return "".join(panel(item, explained=k == 0) for k, item in enumerate(panels(run)))
+
+
+def _section(key: str, title: str, content: str, note: str = "") -> str:
+    if not content:
+        return ""
+    note = f'<p class="note">{note}</p>' if note else ""
+    return f'<section id="{key}"><h2>{esc(title)}</h2>{content}{note}</section>'
+
+
+def _header(run: Run, document: Mapping[str, Any]) -> str:
+    figures = "".join(
+        f'<div class="figure"><span>{esc(name)}</span><b>{esc(value)}</b><small>{esc(remark)}'
+        "</small></div>"
+        for name, value, remark in sections.key_figures(run)
+    )
+    warnings = sum(f["level"] != "info" for f in document["input"]["findings"])
+    alarm = ""
+    if warnings:
+        text = "1 finding" if warnings == 1 else f"{warnings} findings"
+        alarm = f' <a class="alarm" href="#findings">{text} to look at</a>'
+    start = document["start_unix_ns"]
+    when = "" if start is None else f", recorded {sections.utc(start)}"
+    return (
+        f'<header><p class="name">{esc(sections.title(run))}{when}</p>'
+        f"<h1>{esc(sections.unbroken(sections.headline(run)))}.</h1>"
+        f"<p>{esc(sections.gps_sentence(run))}{alarm}</p>"
+        f'<div class="figures">{figures}</div></header>'
+    )
+
+
+def _repeat(command: str, document: Mapping[str, Any]) -> str:
+    return (
+        f'<pre tabindex="0"><code>{esc(command)}</code></pre>'
+        f"<p>with vehnav {esc(document['vehnav'])}, on a recording with the SHA-256 above.</p>"
+        "<details><summary>Every option in force</summary>"
+        f'<p class="note">Marked: not the default.</p>{sections.config_details(document)}</details>'
+    )
+
+
+def _page(title: str, body: str) -> str:
+    """The whole document; its policy lets nothing load and no script run but its own."""
+    style, script = _resource("page.css"), _resource("page.js")
+    digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
+    policy = (
+        "default-src 'none'; img-src data:; style-src 'unsafe-inline'; "
+        f"script-src 'sha256-{digest}'"
+    )
+    return (
+        '<!doctype html>\n<html lang="en"><head><meta charset="utf-8">'
+        f'<meta http-equiv="Content-Security-Policy" content="{policy}">'
+        '<meta name="viewport" content="width=device-width,initial-scale=1">'
+        '<meta name="color-scheme" content="light dark">'
+        f'<meta name="generator" content="vehnav {esc(__version__)}">'
+        f'<link rel="icon" href="data:,"><title>{esc(title)} - vehnav</title>'
+        f"<style>{style}</style></head>\n<body>{body}"
+        f"<footer>vehnav {esc(__version__)}</footer>\n<script>{script}</script></body></html>\n"
+    )
+
+
+def _resource(name: str) -> str:
+    return resources.files("vehnav.report").joinpath(name).read_text("utf-8")

@@ -1,0 +1,154 @@
+"use strict";
+(() => {
+  // The lines that are drawn are the data: read them back, then move one cursor through all of them.
+  const WIDTH = 10000, HEIGHT = 4000;
+  const all = (query, root = document) => [...root.querySelectorAll(query)];
+  const list = (text) => (text ? text.split(" ").map(Number) : []);
+  const readPath = (path) => path.getAttribute("d").split("M").slice(1)
+    .map((part) => part.split("L").map((pair) => pair.split(" ").map(Number)));
+
+  // Index of the last value that is not above x; -1 before the first.
+  const below = (values, x) => {
+    let low = -1, high = values.length;
+    while (high - low > 1) {
+      const middle = (low + high) >> 1;
+      if (values[middle] <= x) low = middle; else high = middle;
+    }
+    return low;
+  };
+  const interpolate = (xs, ys, x) => {
+    if (!xs.length || x < xs[0] || x > xs[xs.length - 1]) return null;
+    const k = Math.min(below(xs, x), xs.length - 2);
+    if (k < 0) return ys[0];
+    const span = xs[k + 1] - xs[k];
+    return span > 0 ? ys[k] + (x - xs[k]) / span * (ys[k + 1] - ys[k]) : ys[k + 1];
+  };
+  const written = (value, step) => {
+    const digits = Math.max(0, Math.min(6, -Math.floor(Math.log10(step) + 1e-9)));
+    return value.toFixed(digits).replace("-", "\u2212");
+  };
+
+  const panels = all(".panel").map((figure) => {
+    const data = figure.dataset;
+    const [x0, x1, y0, y1] = [data.x0, data.x1, data.y0, data.y1].map(Number);
+    const outputs = all("output", figure);
+    const curves = all("path.curve", figure).map((path) => readPath(path).map((part) => [
+      part.map(([x]) => x0 + x / WIDTH * (x1 - x0)),
+      part.map(([, y]) => y0 + (1 - y / HEIGHT) * (y1 - y0)),
+    ]));
+    // The band is drawn first but stands last in the legend.
+    const bands = all("path.c-expected", figure).length;
+    return {
+      figure, x0, x1, step: Number(data.step), outputs,
+      unit: figure.querySelector("h3 small").textContent,
+      plot: figure.querySelector(".plot"), cursor: figure.querySelector(".cursor"),
+      curves: [...curves.slice(bands), ...curves.slice(0, bands)],
+      times: list(data.t), places: list(data.x),
+    };
+  });
+
+  const map = document.querySelector(".map");
+  const mapPlot = map.querySelector(".plot");
+  const box = map.querySelector("svg").viewBox.baseVal;
+  const readout = map.querySelector(".readout");
+  const tracks = all("path.curve", map).map((path) => {
+    const times = list(path.dataset.t);
+    let k = 0;
+    const parts = readPath(path).map((part) => ({
+      t: part.map(() => times[k++]), x: part.map(([x]) => x), y: part.map(([, y]) => y),
+    }));
+    const role = [...path.classList].find((name) => name.startsWith("c-"));
+    return { path, role, parts, dot: map.querySelector(`.dot.${role}`) };
+  });
+
+  const show = (t) => {
+    for (const panel of panels) {
+      const x = panel.times.length ? interpolate(panel.times, panel.places, t) : t;
+      const seen = x !== null && x >= panel.x0 && x <= panel.x1;
+      panel.cursor.style.display = seen ? "block" : "none";
+      if (seen) panel.cursor.style.left = `${(x - panel.x0) / (panel.x1 - panel.x0) * 100}%`;
+      panel.outputs.forEach((output, k) => {
+        let value = null;
+        if (seen) for (const [xs, ys] of panel.curves[k]) value = interpolate(xs, ys, x) ?? value;
+        output.textContent = value === null ? "" : written(value, panel.step);
+      });
+    }
+    for (const { parts, dot } of tracks) {
+      if (!dot) continue;
+      const part = parts.find(({ t: ts }) => t >= ts[0] && t <= ts[ts.length - 1]);
+      dot.style.display = part ? "block" : "none";
+      if (!part) continue;
+      dot.style.left = `${interpolate(part.t, part.x, t) / box.width * 100}%`;
+      dot.style.top = `${interpolate(part.t, part.y, t) / box.height * 100}%`;
+    }
+    const first = panels[0];
+    const values = first.outputs[0] && first.outputs[0].textContent;
+    readout.textContent = `${t.toFixed(1)} s` + (values ? ` \u00b7 error ${values} ${first.unit}` : "");
+    document.documentElement.dataset.time = t.toFixed(3);
+  };
+
+  let wanted = null;
+  const at = (t) => {
+    if (wanted === null) requestAnimationFrame(() => { const next = wanted; wanted = null; show(next); });
+    wanted = t;
+  };
+  const clamp = (x, low, high) => Math.min(Math.max(x, low), high);
+
+  for (const panel of panels) {
+    const toTime = (x) => panel.times.length ? interpolate(panel.places, panel.times, x) : x;
+    const follow = (event) => {
+      const frame = panel.plot.getBoundingClientRect();
+      const share = clamp((event.clientX - frame.left) / frame.width, 0, 1);
+      const t = toTime(panel.x0 + share * (panel.x1 - panel.x0));
+      if (t !== null) at(t);
+    };
+    panel.plot.addEventListener("pointermove", follow);
+    panel.plot.addEventListener("pointerdown", follow);
+    panel.plot.addEventListener("keydown", (event) => {
+      const way = { ArrowLeft: -1, ArrowRight: 1 }[event.key];
+      if (!way) return;
+      event.preventDefault();
+      const span = panels[0].x1 - panels[0].x0;
+      const now = Number(document.documentElement.dataset.time ?? panels[0].x0);
+      at(clamp(now + way * span / (event.shiftKey ? 20 : 200), panels[0].x0, panels[0].x1));
+    });
+  }
+
+  // On the map: the nearest place on a track that is shown, and its instant.
+  const nearest = (x, y) => {
+    let best = Infinity, time = null;
+    for (const { path, parts } of tracks) {
+      if (path.classList.contains("hidden")) continue;
+      for (const part of parts) {
+        for (let k = 0; k < part.t.length; k++) {
+          const j = Math.min(k + 1, part.t.length - 1);
+          const dx = part.x[j] - part.x[k], dy = part.y[j] - part.y[k], size = dx * dx + dy * dy;
+          const s = size > 0 ? clamp(((x - part.x[k]) * dx + (y - part.y[k]) * dy) / size, 0, 1) : 0;
+          const off = (part.x[k] + s * dx - x) ** 2 + (part.y[k] + s * dy - y) ** 2;
+          if (off < best) { best = off; time = part.t[k] + s * (part.t[j] - part.t[k]); }
+        }
+      }
+    }
+    return time;
+  };
+  const onMap = (event) => {
+    if (event.target.dataset.at) { at(Number(event.target.dataset.at)); return; }
+    const frame = mapPlot.getBoundingClientRect();
+    const t = nearest((event.clientX - frame.left) / frame.width * box.width,
+      (event.clientY - frame.top) / frame.height * box.height);
+    if (t !== null) at(t);
+  };
+  mapPlot.addEventListener("pointermove", onMap);
+  mapPlot.addEventListener("pointerdown", onMap);
+  for (const input of all("input[data-role]", map)) {
+    const apply = () => {
+      for (const { path, role, dot } of tracks) {
+        if (role !== `c-${input.dataset.role}`) continue;
+        path.classList.toggle("hidden", !input.checked);
+        if (dot) dot.style.visibility = input.checked ? "" : "hidden";
+      }
+    };
+    input.addEventListener("change", apply);
+    apply();
+  }
+})();
