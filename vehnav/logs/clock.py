@@ -25,6 +25,8 @@ def finite_rows(t_ns: TimeArray, *values: Array) -> BoolArray:
     good = np.asarray(t_ns != NO_TIME)
     for value in values:
         finite = np.isfinite(value)
+        if finite.all():  # the usual case; row by row costs ten times as much
+            continue
         good &= finite if finite.ndim == 1 else finite.all(axis=1)
     return good
 

@@ -36,6 +36,7 @@ GROUPS: Final = MappingProxyType(
         "dvel": Group(SPEED_UNITS, "m/s"),
         "angle": Group(ANGLE_UNITS, "deg"),
         "length": Group(LENGTH_UNITS, "m"),
+        "number": Group(MappingProxyType({"1": 1.0}), "1"),
         "speed": Group(SPEED_UNITS, "m/s"),
     }
 )
@@ -51,12 +52,14 @@ QUANTITIES: Final = MappingProxyType(
         **dict.fromkeys(("v_east", "v_north", "v_up", "v_down", "gps_speed", "speed"), "speed"),
         **dict.fromkeys(("sigma_v_east", "sigma_v_north", "sigma_v_up"), "speed"),
         "sigma_horizontal": "length",
+        "status": "number",
     }
 )
 """Quantity -> its group."""
 
-TIMES: Final = ("time", "log_time", "fix_time")
-"""Stamps: of the sample, of the recorder, and one that changes with each new fix."""
+TIMES: Final = ("time", "log_time", "fix_time", "time_part")
+"""Stamps: of the sample, of the recorder, one that changes with each new fix, and nanoseconds
+that belong to ``time``."""
 
 GPS_QUANTITIES: Final = frozenset(QUANTITIES) - {
     *(f"{name}_{axis}" for name in ("gyro", "accel", "dtheta", "dvel") for axis in "xyz"),
@@ -122,10 +125,10 @@ ALIASES: Final = MappingProxyType(
         "v_up": "v_up vu vel_up velocity_up vel_u v_u",
         "v_down": "v_down vd vel_down velocity_down vel_d v_d",
         "gps_speed": "gps_speed ground_speed sog",
-        "course": "course cog bearing gps_course track heading_motion",
+        "course": "course cog bearing gps_course track heading_motion direction",
         "sigma_east": "sigma_east sde sd_e sigma_e std_east",
         "sigma_north": "sigma_north sdn sd_n sigma_n std_north",
-        "sigma_up": "sigma_up sdu sd_u sigma_u std_up",
+        "sigma_up": "sigma_up sdu sd_u sigma_u std_up vertical_accuracy verticalaccuracy vacc",
         "sigma_horizontal": "sigma_horizontal horizontal_accuracy hacc h_acc horizontalaccuracy",
         "sigma_v_east": "sigma_v_east sdve",
         "sigma_v_north": "sigma_v_north sdvn",
@@ -135,6 +138,7 @@ ALIASES: Final = MappingProxyType(
         "epoch unix_timestamp utc gps_time time_stamp",
         "log_time": "t_log log_time rosbagtimestamp receive_time",
         "fix_time": "fix_time",
+        "status": "field_status_status status_status",
     }
 )
 """Quantity -> names it goes by in lower case, units removed, other signs as "_"; first wins."""
@@ -170,6 +174,15 @@ def spelled_unit(text: str) -> str | None:
     return _SPELLED.get(text.strip().lower().replace("⁻¹", "^-1").replace("⁻²", "^-2"))
 
 
+def plain_name(header: str) -> str:
+    """A header in lower case, with "_" for all other signs.
+
+    >>> plain_name("imu.angular_velocity.x"), plain_name("Acc X (m/s^2)")
+    ('imu_angular_velocity_x', 'acc_x_m_s_2')
+    """
+    return re.sub(r"[^a-z0-9]+", "_", header.strip().lower()).strip("_")
+
+
 def name_and_unit(header: str) -> tuple[str, str | None]:
     """Name in lower case with "_" for other signs, and the unit that the header declares.
 
@@ -180,7 +193,7 @@ def name_and_unit(header: str) -> tuple[str, str | None]:
     bracket = re.fullmatch(r"(.*?)\s*[\[(]\s*(.*?)\s*[\])]", text)
     if bracket:
         text, unit = bracket[1], spelled_unit(bracket[2])
-    name = re.sub(r"[^a-z0-9]+", "_", text).strip("_")
+    name = plain_name(text)
     if unit is None:
         for suffix in _SUFFIXES:
             if name.endswith("_" + suffix):
@@ -196,7 +209,7 @@ def named_columns(names: Sequence[str]) -> dict[str, Column]:
     """
     known: dict[str, Column] = {}
     for index, header in enumerate(names):
-        plain = re.sub(r"[^a-z0-9]+", "_", header.strip().lower()).strip("_")
+        plain = plain_name(header)
         base, unit = name_and_unit(header)
         known.setdefault(base, Column(index, header, unit=unit))
         known.setdefault(plain, Column(index, header))

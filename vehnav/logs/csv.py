@@ -15,6 +15,7 @@ from vehnav.logs.check import clean_gnss, clean_imu, clean_speed
 from vehnav.logs.columns import GPS_QUANTITIES, list_names, quantity_and_unit
 from vehnav.logs.layout import Layout, choose_clock, lay_out, scale_to_si
 from vehnav.logs.log import Array, Gnss, Imu, Log, ReadOptions, Speed, TimeArray
+from vehnav.logs.presets import refuse_gravity_free
 from vehnav.logs.table import Table
 from vehnav.logs.timebase import is_unix
 
@@ -44,6 +45,8 @@ def read_csv(path: str, options: ReadOptions) -> Log:
     """
     layout = lay_out(path, recording_options(options))
     positions = layout.has("lat", "lon")
+    if "accel_x" not in options.columns and (not positions or layout.some_inertial):
+        refuse_gravity_free(path, layout.sheet.names, layout.columns)
     if layout.imu is None and (not positions or layout.some_inertial):
         raise LogError(layout.missing_imu())
     if not layout.has("time") and not layout.has("log_time"):
@@ -80,6 +83,9 @@ def read_csv_gnss(path: str, options: ReadOptions) -> tuple[Gnss, list[Finding]]
         No latitude and longitude, or no time, or no fix left; the text lists what there is.
     """
     layout = lay_out(path, gps_options(options), only_present=True)
+    if layout.has("speed", "course") and not layout.has("gps_speed"):
+        columns = {**layout.columns, "gps_speed": layout.columns["speed"]}
+        layout = replace(layout, columns=columns)
     for quantity, option in (("lat", "lat_deg"), ("lon", "lon_deg"), ("time", "gps_time_s")):
         if not layout.has(quantity) and not (quantity == "time" and layout.has("log_time")):
             raise LogError(
@@ -208,6 +214,7 @@ def _gnss(table: Table, layout: Layout, t_ns: TimeArray, findings: list[Finding]
         v_n=_velocity(take),
         sigma_pos=_sigma(take),
         sigma_vel=take("sigma_v_east", "sigma_v_north", "sigma_v_up"),
+        status=_status(take),
         source=f"{lat_name}, {lon_name}",
         where=f"{layout.sheet.path}: GPS",
     )
@@ -249,7 +256,10 @@ def _velocity(take: Take) -> Array | None:
         )
         return np.hstack([horizontal, vertical])
     polar = take("gps_speed", "course")
-    return None if polar is None else velocity_from_course(polar[:, 0], polar[:, 1])
+    if polar is None:
+        return None
+    speed = np.where(polar[:, 0] < 0.0, np.nan, polar[:, 0])  # apps write -1 for none
+    return velocity_from_course(speed, polar[:, 1])
 
 
 def velocity_from_course(speed: Array, course: Array) -> Array:
@@ -263,16 +273,23 @@ def velocity_from_course(speed: Array, course: Array) -> Array:
     return np.column_stack([speed * np.sin(angle), speed * np.cos(angle), 0.0 * speed])
 
 
+def _status(take: Take) -> npt.NDArray[np.int64] | None:
+    """As ``sensor_msgs/NavSatStatus``; unknown where it is missing."""
+    status = take("status")
+    if status is None:
+        return None
+    return np.where(np.isfinite(status[:, 0]), status[:, 0], -2.0).astype(np.int64)
+
+
 def _sigma(take: Take) -> Array | None:
     full = take("sigma_east", "sigma_north", "sigma_up")
     if full is not None:
         return full
-    horizontal = take("sigma_horizontal")
-    return (
-        None
-        if horizontal is None
-        else np.hstack([horizontal, horizontal, VERTICAL_SIGMA_RATIO * horizontal])
-    )
+    horizontal, up = take("sigma_horizontal"), take("sigma_up")
+    if horizontal is None:
+        return None
+    up = VERTICAL_SIGMA_RATIO * horizontal if up is None else up
+    return np.hstack([horizontal, horizontal, up])
 
 
 def _speed(table: Table, layout: Layout, t_ns: TimeArray, findings: list[Finding]) -> Speed | None:

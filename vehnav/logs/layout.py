@@ -67,9 +67,12 @@ class Layout:
             declared = re.search(r"\baxes\s*[:=]\s*([FBLRUD]{3})\b", line)
             if declared:
                 return declared[1]
-        own = {f"{name}_{axis}" for name in ("gyro", "accel") for axis in AXES}
         lower = {name.lower() for name in self.sheet.names}
-        return "RFU" if own <= lower and lower & {"t_ns", "time_s"} else self.preset.axes
+        for kinds in (("gyro", "accel"), ("dtheta", "dvel")):
+            own = {f"{kind}_{axis}" for kind in kinds for axis in AXES}
+            if own <= lower and lower & {"t_ns", "time_s"}:
+                return "RFU"
+        return self.preset.axes
 
     @property
     def some_inertial(self) -> bool:
@@ -99,7 +102,8 @@ class Layout:
         return (
             f"{self.sheet.path}: no column for {', '.join(missing)}; name them with "
             f"--columns {','.join(f'{name}=NAME' for name in missing)} (and --gyro-unit, "
-            f"--accel-unit); the file has {list_names(self.sheet.names)}"
+            f"--accel-unit); the file has {list_names(self.sheet.names)}. "
+            "Where an app keeps each sensor in a file of its own, give the folder"
         )
 
 
@@ -112,7 +116,7 @@ def lay_out(path: str, options: ReadOptions, *, only_present: bool = False) -> L
         Not a table; a declared column that is not there; an unknown quantity or preset.
     """
     sheet = sniff(path)
-    preset = choose_preset(sheet.names, options.preset)
+    preset = choose_preset(sheet, options.preset)
     declared = declared_columns(options, sheet.names, path, only_present=only_present)
     return Layout(sheet, preset, MappingProxyType({**preset.place(sheet.names), **declared}))
 
@@ -140,9 +144,15 @@ def choose_clock(table: Table, layout: Layout, options: ReadOptions, kind: str) 
     names = [name for name in ("time", "log_time") if layout.has(name)]
     if len(names) == 2 and options.time is not None:
         names = names[:1] if options.time == "header" else names[1:]
-    if len(names) == 1:
-        return stamps(table, layout.columns[names[0]], kind=kind)
-    header, log = (stamps(table, layout.columns[name], kind=kind) for name in names)
+    clocks = [stamps(table, layout.columns[name], kind=kind) for name in names]
+    if names[0] == "time" and layout.has("time_part"):
+        part = table.integers(layout.columns["time_part"].index)
+        if part is not None:
+            whole = (clocks[0] != NO_TIME) & (part != NO_TIME)
+            clocks[0] = np.where(whole, clocks[0] + np.where(whole, part, 0), NO_TIME)
+    if len(clocks) == 1:
+        return clocks[0]
+    header, log = clocks
     trouble = _clock_trouble(header, log)
     chosen = "log_time" if trouble else "time"
     text = f"{layout.sheet.path}: stamps from column {layout.columns[chosen].name!r}"

@@ -115,17 +115,20 @@ FORMATS: Final = (
 )
 
 
+FOLDER: Final = Format("folder", log="vehnav.logs.folders:read_folder")
+
+
 def identify(path: str) -> Format:
-    """What kind of file this is.
+    """What kind of file this is; which kind a folder is, :mod:`vehnav.logs.folders` finds.
 
     Raises
     ------
     LogError
-        Missing, unreadable, empty, a folder, or nothing that is known.
+        Missing, unreadable, empty, or nothing that is known.
     """
     place = Path(path)
     if place.is_dir():
-        raise LogError(f"{path}: a folder; give the recording inside it")
+        return FOLDER
     try:
         with place.open("rb") as file:
             beginning = file.read(BEGINNING)

@@ -29,8 +29,8 @@ _MAX_S: Final = 9.2e9
 
 def is_unix(t_ns: TimeArray) -> bool:
     """Whether stamps count from 1970: the first good one lies after 1990."""
-    good = t_ns[t_ns != NO_TIME]
-    return bool(good.size and good[0] >= FIRST_UNIX_NS)
+    first = int(np.argmax(t_ns != NO_TIME)) if t_ns.size else 0
+    return bool(t_ns.size and t_ns[first] >= FIRST_UNIX_NS)
 
 
 def stamps(table: Table, column: Column, *, kind: str) -> TimeArray:
