@@ -18,19 +18,18 @@ def run(*args: object) -> Result:
     return CliRunner().invoke(cli, ["compare", *map(str, args)])
 
 
-@pytest.fixture
-def files(tmp_path: Path) -> dict[str, Path]:
+@pytest.fixture(scope="module")
+def files(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     """A drive on a circle, one 3 m east and 4 m north of it, and its fixes at 1 Hz as CSV."""
+    tmp_path = tmp_path_factory.mktemp("compare")
     circle = Circle()
-    t = np.arange(0.0, 120.005, 0.01)
+    t = np.arange(0.0, 120.005, 0.02)
     paths = {}
     for name, moved in (("good", (0.0, 0.0, 0.0)), ("off", (3.0, 4.0, 0.0))):
         paths[name] = tmp_path / f"{name}.csv"
         made = trajectory_of(t, circle.enu(t) + np.array(moved), circle.v(t), circle.heading(t))
         write_trajectory(made, paths[name])
-    fixes = trajectory_of(t, circle.enu(t), circle.v(t), circle.heading(t)).rows(
-        slice(0, None, 100)
-    )
+    fixes = trajectory_of(t, circle.enu(t), circle.v(t), circle.heading(t)).rows(slice(0, None, 50))
     paths["gps"] = tmp_path / "gps.csv"
     rows = zip(fixes.t_ns.tolist(), np.degrees(fixes.lat), np.degrees(fixes.lon), strict=True)
     text = [f"{ns // 10**9}.{ns % 10**9:09d},{lat:.10f},{lon:.10f},30" for ns, lat, lon in rows]
@@ -130,6 +129,34 @@ def test_lever_arm(files) -> None:
     arm = run(files["good"], files["gps"], "--lever-arm", "1.5,0,0", "--json")
     errors = json.loads(arm.stdout)["trajectories"][0]["errors"]
     assert errors["cross_m"]["mean"] == pytest.approx(1.5, abs=0.02)
+
+
+def test_align_is_said(files) -> None:
+    result = run(files["off"], files["gps"], "--align", "yaw+translation")
+    assert "ALIGNED   yaw+translation" in result.stdout
+    row = next(line for line in result.stdout.splitlines() if line.startswith("horizontal m"))
+    assert float(row.split()[2]) < 0.01
+    document = json.loads(run(files["off"], files["gps"], "--align", "yaw", "--json").stdout)
+    assert document["trajectories"][0]["errors"]["align"] == "yaw"
+
+
+def test_outages(files) -> None:
+    result = run(files["off"], files["gps"], "--outage", "20:40", "--outage", "60:70", "--json")
+    first, second = json.loads(result.stdout)["trajectories"][0]["errors"]["outages"]
+    assert (first["start_s"], first["length_s"], first["fixes"]) == (20.0, 20.0, 21)
+    assert first["distance_m"] == pytest.approx(200.0, rel=1e-2)
+    assert second["max_m"] == pytest.approx(5.0, abs=1e-3)
+    text = run(files["off"], files["gps"], "--outage", "20:40").stdout
+    assert "outage       20 s, 20 s long, 200 m: rms 5.00" in text
+    assert run(files["off"], files["gps"], "--outage", "40:20").exit_code == 2
+
+
+def test_offset_auto_on_a_circle_tells_nothing(files) -> None:
+    """Constant speed on a constant radius: a delay looks like a turn; it must say so."""
+    result = run(files["good"], files["gps"], "--gps-time-offset", "auto")
+    assert result.exit_code == 0
+    assert "+0.000 s added" in result.stdout
+    assert "gps-delay" in result.stderr
 
 
 def test_wrong_inputs(files, tmp_path: Path) -> None:

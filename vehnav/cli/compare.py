@@ -19,6 +19,7 @@ from vehnav.cli.common import (
     print_json,
     strict_option,
 )
+from vehnav.cli.compare_screen import screen
 from vehnav.cli.options import ParamType
 from vehnav.errors import ConfigError
 
@@ -26,29 +27,37 @@ if TYPE_CHECKING:
     from vehnav.evaluation import Errors
     from vehnav.export.load import Track
 
-ROWS = (
-    ("horizontal", "m", "horizontal_m"),
-    ("east", "m", "east_m"),
-    ("north", "m", "north_m"),
-    ("up", "m", "up_m"),
-    ("along", "m", "along_m"),
-    ("cross", "m", "cross_m"),
-    ("velocity", "m/s", "velocity_m_s"),
-    ("heading", "deg", "heading_deg"),
-)
-FIGURES = ("rms", "mean", "median", "p95", "max", "end")
-WIDE = (
-    ("rms m", "horizontal_m.rms"),
-    ("p95 m", "horizontal_m.p95"),
-    ("max m", "horizontal_m.max"),
-    ("end m", "horizontal_m.end"),
-    ("along rms", "along_m.rms"),
-    ("cross rms", "cross_m.rms"),
-    ("v rms m/s", "velocity_m_s.rms"),
-    ("head rms", "heading_deg.rms"),
-    ("end %", "percent_of_distance.end"),
-    ("max %", "percent_of_distance.max"),
-)
+
+class OffsetType(ParamType):
+    """Seconds, or ``auto``."""
+
+    name = "S|auto"
+
+    def convert(self, value: Any, param: Any, ctx: Any) -> float | str:
+        """Read a finite number or the word."""
+        if value == "auto":
+            return "auto"
+        number: float = NumberType().convert(value, param, ctx)
+        return number
+
+
+class SpanType(ParamType):
+    """``A:B``: seconds from the start."""
+
+    name = "A:B"
+
+    def convert(self, value: Any, param: Any, ctx: Any) -> tuple[float, float]:
+        """Read both; the second must be later."""
+        if isinstance(value, tuple):
+            return value
+        first, colon, last = str(value).partition(":")
+        if not colon:
+            self.fail(f"{value!r}: expected A:B, e.g. 120:180", param, ctx)
+        start: float = NumberType().convert(first, param, ctx)
+        end: float = NumberType().convert(last, param, ctx)
+        if end <= start:
+            self.fail(f"{value!r}: ends before it starts", param, ctx)
+        return start, end
 
 
 class BarType(ParamType):
@@ -79,11 +88,11 @@ class BarType(ParamType):
 @option(
     "input",
     "--gps-time-offset",
-    type=NumberType(),
+    type=OffsetType(),
     default=0.0,
     show_default=True,
-    metavar="S",
-    help="Seconds to add to the stamps of the GPS.",
+    metavar="S|auto",
+    help="Seconds to add to the stamps of the GPS; auto: what the motion says (always reported).",
 )
 @option("input", "--gps-topic", metavar="TOPIC", help="Topic of the GPS.  [default: by type]")
 @option("input", "--preset", metavar="NAME", help="Known layout of a CSV with fixes.")
@@ -107,6 +116,21 @@ class BarType(ParamType):
     help="The antenna from the vehicle's point, m in the vehicle's axes.",
 )
 @click.option(
+    "--outage",
+    "outages",
+    type=SpanType(),
+    multiple=True,
+    help="Judge this interval by itself, too: seconds from the start of the trajectory. "
+    "Repeatable.",
+)
+@click.option(
+    "--align",
+    type=click.Choice(["none", "yaw", "yaw+translation", "full"]),
+    default="none",
+    show_default=True,
+    help="Fit the trajectory to the GPS first; the result is then no longer dead reckoning.",
+)
+@click.option(
     "--max",
     "bars",
     type=BarType(),
@@ -120,7 +144,7 @@ def compare(files: tuple[str, ...], as_json: bool, strict: bool, **options: Any)
 
     The last file judges the others; each may be a trajectory of vehnav (CSV, Parquet, TUM, KITTI,
     JSON) or anything that holds fixes. The trajectory is interpolated to the fixes; nothing is
-    aligned. Errors are estimate minus reference.
+    aligned unless --align asks for it. Errors are estimate minus reference.
     """
     if len(files) < 2:
         raise click.UsageError(
@@ -133,7 +157,7 @@ def compare(files: tuple[str, ...], as_json: bool, strict: bool, **options: Any)
     if as_json:
         print_json({"reference": files[-1], "trajectories": documents, "missed": missed})
     else:
-        click.echo(_screen(files, results, documents))
+        click.echo(screen(files, results, documents))
     findings = [f for t in tracks for f in t.findings] + [f for r in results for f in r.findings]
     print_findings(findings, start_ns=int(tracks[-1].trajectory.t_ns[0]), least="warning")
     for bar in missed:
@@ -171,8 +195,13 @@ def _judge(track: Track, reference: Track, options: dict[str, Any]) -> Errors:
             judge_from_ns=first,
             exclude=() if last is None else [(last + 1, 2**62)],
             time_offset=options["gps_time_offset"],
+            estimate_offset=True,
             lever_arm=options["lever_arm"],
+            align=options["align"],
             c_nb_reference=c_nb,
+            outages=[
+                (start + round(a * 1e9), start + round(b * 1e9)) for a, b in options["outages"]
+            ],
         )
     except LogError as error:
         raise LogError(f"{track.path} against {reference.path}: {error}") from error
@@ -183,6 +212,7 @@ def _document(path: str, errors: Errors) -> dict[str, Any]:
         "file": path,
         "fixes": dict(errors.counts),
         "time_offset_s": errors.time_offset,
+        "found_offset": None if errors.found_offset is None else errors.found_offset.to_dict(),
         "start_unix_ns": int(errors.t_ns[0]),
         "duration_s": float(errors.t_ns[-1] - errors.t_ns[0]) * 1e-9,
         "errors": errors.to_dict(),
@@ -209,83 +239,3 @@ def _missed_bars(
                 row = {"file": document["file"], "metric": f"errors.{name}", "value": value}
                 missed.append({**row, "max": limit, "text": text})
     return missed
-
-
-# ---- what is printed -----------------------------------------------------------------------------
-
-
-def _screen(files: tuple[str, ...], results: list[Errors], documents: list[dict[str, Any]]) -> str:
-    """One screen: one trajectory in full, several as one table."""
-    if len(results) == 1:
-        lines = [f"{files[0]} against {files[-1]}", *_matched(results[0])]
-        return "\n".join([*lines, "", *_table(documents[0]["errors"])])
-    lines = [f"{len(results)} trajectories against {files[-1]}"]
-    for path, errors in zip(files[:-1], results, strict=True):
-        lines += [f"  {path}", *(f"  {line}" for line in _matched(errors))]
-    return "\n".join([*lines, "", *_wide_table(documents)])
-
-
-def _matched(errors: Errors) -> list[str]:
-    counts = errors.counts
-    left_out = {
-        "outside the trajectory": counts["outside"],
-        "before judging starts": counts["before"],
-        "excluded": counts["excluded"],
-        "in gaps of the trajectory": counts["in_gaps"],
-    }
-    why = ", ".join(f"{n} {name}" for name, n in left_out.items() if n)
-    span = float(errors.t_ns[-1] - errors.t_ns[0]) * 1e-9
-    lines = [
-        f"  fixes     {counts['judged']} of {counts['total']} judged"
-        + (f" ({why})" if why else ""),
-        f"  driven    {errors.distance[-1]:.0f} m in {span:.1f} s",
-        f"  offset    {errors.time_offset:+.3f} s added to the GPS",
-    ]
-    sigma = errors.reference_sigma_m()
-    if sigma is not None:
-        lines.append(f"  GPS       {_number(sigma)} m uncertain (its own sigma)")
-    return lines
-
-
-def _table(tree: dict[str, Any]) -> list[str]:
-    """The error table of one trajectory."""
-    lines = [" " * 18 + "".join(f"{name:>10}" for name in FIGURES)]
-    for name, unit, key in ROWS:
-        if tree[key] is not None:
-            figures = "".join(f"{_number(tree[key][f]):>10}" for f in FIGURES)
-            lines.append(f"{name + ' ' + unit:<18}{figures}")
-    share = tree["percent_of_distance"]
-    lines += [
-        "",
-        f"percent of distance  end {_number(share['end'])}  max {_number(share['max'])}    "
-        f"CEP50 {_number(tree['cep50_m'])} m  CEP95 {_number(tree['cep95_m'])} m",
-    ]
-    if tree["segments"]:
-        parts = [f"{s['length_m']:.0f} m {_number(s['percent'])} %" for s in tree["segments"]]
-        lines.append("segments  " + "  ".join(parts))
-    return lines
-
-
-def _wide_table(documents: list[dict[str, Any]]) -> list[str]:
-    """One line a trajectory."""
-    from vehnav.evaluation.metrics import metric
-
-    names = [document["file"] for document in documents]
-    width = min(max(len(name) for name in names), 40)
-    lines = [" " * width + "".join(f"{title:>11}" for title, _ in WIDE)]
-    for name, document in zip(names, documents, strict=True):
-        shown = name if len(name) <= width else "..." + name[3 - width :]
-        figures = "".join(f"{_number(metric(document['errors'], key)):>11}" for _, key in WIDE)
-        lines.append(f"{shown:<{width}}{figures}")
-    return lines
-
-
-def _number(value: float | None) -> str:
-    """Three or four digits."""
-    if value is None:
-        return "-"
-    size = abs(value)
-    if size >= 1e7:
-        return f"{value:.2e}"
-    decimals = 0 if size >= 1000.0 else 1 if size >= 100.0 else 2 if size >= 1.0 else 3
-    return f"{round(value, decimals) + 0.0:.{decimals}f}"  # + 0.0: no minus before a zero
