@@ -25,7 +25,7 @@ class Rest:
     Attributes
     ----------
     omega : (3,)
-        rad/s
+        rad/s, slope of the angle.
     f : (3,)
         m/s2
     """
@@ -49,9 +49,18 @@ class Rest:
 
 
 def mean_over_rest(omega: Array, f: Array, first: int, last: int) -> Rest:
-    """Means over the samples ``first`` to ``last``, both included."""
+    """Means over the samples ``first`` to ``last``, both included.
+
+    The rate is weighed by a parabola that is zero at both ends, which is the least-squares slope
+    of the angle. A plain mean is the difference of two angles over the time: a car that rocks by
+    0.1 deg at idle would show 6 deg/h over a minute. The weights cost 20 % of variance on white
+    noise.
+    """
     inside = slice(first, last + 1)
-    return Rest(omega[inside].mean(axis=0), f[inside].mean(axis=0))
+    u = (np.arange(last + 1 - first) + 0.5) / (last + 1 - first)
+    weight = u * (1.0 - u)
+    slope = weight @ omega[inside] / weight.sum()
+    return Rest(np.asarray(slope), f[inside].mean(axis=0))
 
 
 def gyro_bias(rest: Rest, c_nb: Array, lat: float, *, earth: Ellipsoid = WGS84) -> Array:

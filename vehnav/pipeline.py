@@ -229,7 +229,8 @@ def search_stops(log: Log, config: Config = DEFAULTS) -> StopSearch:
     """The stops of a log, with the samples they were found in. LogError as :func:`run`."""
     samples, rule = _samples(log, config), stop_rule(config)
     statistics = stop_statistics(samples.t, samples.omega, samples.f, rule)
-    return StopSearch(samples, rule, statistics, stops_from_statistics(samples.t, statistics, rule))
+    stops = stops_from_statistics(samples.t, samples.f, statistics, rule)
+    return StopSearch(samples, rule, statistics, stops)
 
 
 def no_stop_advice(path: str, search: StopSearch) -> str:

@@ -31,6 +31,12 @@ EXTEND = 0.5
 """s by which both ends of a quiet run are moved outward: the window is its own guard."""
 RMS_GUARD = 0.3
 """s by which both ends of a stop of the paper's statistic are moved inward (spec A 4.2)."""
+TRIM_MEAN = 0.5
+"""s: running mean of the specific force that has to stay near that of the stop until its end."""
+TRIM_FORCE = 0.06
+"""m/s2 by which it may differ: above the noise of the mean, below any departure."""
+TRIM_SIGMAS = 4.0
+"""or that many of its own deviations in the middle of the stop, where vibration is strong."""
 MIN_SHARE = 0.6
 """of the expected samples that a window must hold: a gap is not quiet."""
 MARGIN_WARNING = 0.8
@@ -149,11 +155,13 @@ def find_stops(t: Array, omega: Array, f: Array, rule: StopRule) -> list[Stop]:
     rule : StopRule
     """
     statistics = stop_statistics(t, omega, f, rule)
-    return stops_from_statistics(t, statistics, rule)
+    return stops_from_statistics(t, f, statistics, rule)
 
 
-def stops_from_statistics(t: Array, statistics: StopStatistics, rule: StopRule) -> list[Stop]:
-    """Stops of statistics that are already there."""
+def stops_from_statistics(
+    t: Array, f: Array, statistics: StopStatistics, rule: StopRule
+) -> list[Stop]:
+    """Stops of statistics that are already there; ``f`` (n, 3) m/s2 trims their ends."""
     margin = statistics.margin(rule.threshold)
     quiet = runs(margin < 1.0)
     long_enough = t[quiet[:, 1]] - t[quiet[:, 0]] >= rule.dwell
@@ -170,9 +178,28 @@ def stops_from_statistics(t: Array, statistics: StopStatistics, rule: StopRule) 
         last = int(np.searchsorted(t, t[last] + shift, side="right")) - 1
         if stops and first <= stops[-1].last:
             first = stops[-1].last + 1
+        last = _last_still(t, f, first, last)
         if last > first:
             stops.append(Stop(first, last, float(t[first]), float(t[last]), *figures))
     return stops
+
+
+def _last_still(t: Array, f: Array, first: int, last: int) -> int:
+    """Where a stop really ends: a gentle start is quieter than the threshold.
+
+    The last instant whose 0.5 s mean of the specific force is that of the middle half (spec A 4.2
+    rule 4). The start is not trimmed: there the vehicle settles on its springs, which is standing.
+    """
+    if last - first < 8:
+        return last
+    inside = slice(first, last + 1)
+    mean = running_mean(t[inside], f[inside], TRIM_MEAN)
+    quarter = (last + 1 - first) // 4
+    middle = slice(quarter, last + 1 - first - quarter)
+    away = np.linalg.norm(mean - np.median(mean[middle], axis=0), axis=1)
+    noise = float(np.sqrt(np.mean(away[middle] ** 2)))
+    near = np.flatnonzero(away <= max(TRIM_FORCE, TRIM_SIGMAS * noise))
+    return first + int(near[-1]) if near.size else last
 
 
 def stopped_mask(n: int, stops: list[Stop]) -> npt.NDArray[np.bool_]:
