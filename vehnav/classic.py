@@ -5,7 +5,9 @@ stop shows. What the same stops give offline is in :mod:`vehnav.offline`.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Final, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -16,6 +18,7 @@ from vehnav.legs import LegNoise
 from vehnav.rest import white_noise
 from vehnav.rotation import angles_from_c_nb, c_nb_from_angles
 from vehnav.stops import Stop, stop_numbers
+from vehnav.strapdown.eci import mechanize_eci
 from vehnav.strapdown.enu import Solution, StopControl, mechanize_enu
 from vehnav.strapdown.increments import Increments
 
@@ -28,6 +31,12 @@ GUARD = 0.3
 minute later (spec A 4.3)."""
 MEAN_OFFSET = 0.5
 """s in the gain 1/(t + 0.5 s): the running mean since levelling began (spec A 4.3, spec C 3)."""
+
+MECHANIZATIONS: Final[dict[str, Callable[..., Solution]]] = {
+    "enu": mechanize_enu,
+    "eci": mechanize_eci,
+}
+"""Frame -> function with the arguments of :func:`vehnav.strapdown.enu.mechanize_enu`."""
 
 
 @dataclass(frozen=True)
@@ -46,6 +55,8 @@ class Drive:
     earth : Ellipsoid
     vertical : str
         ``clamp`` or ``free``.
+    frame : str
+        Of the mechanization: a key of :data:`MECHANIZATIONS`.
     levelling_rate : float or None
         k g, 1/s; None: the running mean.
     """
@@ -56,7 +67,8 @@ class Drive:
     increments: Increments
     stops: list[Stop]
     earth: Ellipsoid
-    vertical: str = "clamp"
+    vertical: Literal["clamp", "free"] = "clamp"
+    frame: str = "enu"
     levelling_rate: float | None = None
 
     @property
@@ -216,13 +228,13 @@ def dead_reckon(
         dvel = increments.dvel - accel_bias * increments.dt[:, None]
         increments = replace(increments, dvel=dvel)
     control = stop_control(drive, levelling=levelling, reset=reset)
-    return mechanize_enu(
+    return MECHANIZATIONS[drive.frame](
         increments.part(drive.first, last),
         position=start.position,
         v_n=start.v_n,
         c_nb=start.c_nb,
         control=control.part(drive.first, last),
-        vertical="clamp" if drive.vertical == "clamp" else "free",
+        vertical=drive.vertical,
         earth=drive.earth,
     )
 

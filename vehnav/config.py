@@ -11,9 +11,6 @@ from typing import Any, Literal
 
 from vehnav.errors import ConfigError
 
-METHODS = ("stops", "free")
-FRAMES = ("enu",)
-
 
 @dataclass(frozen=True)
 class Config:
@@ -37,6 +34,8 @@ class Config:
         The two procedures.
     causal : bool
         Whether only what was known at the time may be used.
+    frame : {"enu", "eci"}
+        Of the mechanization.
     vertical : {"clamp", "free"}
     ellipsoid : {"wgs84", "krasovsky"}
     levelling_rate : float or None
@@ -69,7 +68,7 @@ class Config:
     levelling: bool = True
     reset: bool = True
     causal: bool = False
-    frame: Literal["enu"] = "enu"
+    frame: Literal["enu", "eci"] = "enu"
     vertical: Literal["clamp", "free"] = "clamp"
     ellipsoid: Literal["wgs84", "krasovsky"] = "wgs84"
     levelling_rate: float | None = None
@@ -88,8 +87,6 @@ class Config:
             raise ConfigError(f"--end {self.end:g} is not after --start {self.start:g}")
         if self.start_position is not None and abs(self.start_position[0]) > 90.0:
             raise ConfigError(f"--start-position: latitude {self.start_position[0]} is beyond 90")
-        if self.gps == "none" and self.start_position is None and self.start_heading is not None:
-            pass  # a heading without a place: a local track turned the right way
         for name in ("max_gap", "gps_start_seconds"):
             if getattr(self, name) < 0.0:
                 raise ConfigError(f"--{name.replace('_', '-')} must not be negative")

@@ -176,7 +176,7 @@ def fit_legs(
         information = information + weighted @ part.h_accel
         score = score + weighted @ (z - part.h_gyro @ mean)
     covariance = np.linalg.inv(information)
-    accel_bias = covariance @ score
+    accel_bias: Array = np.asarray(covariance @ score, dtype=np.float64)
     errors = [
         part.errors(z, mean, accel_bias, covariance)
         for part, z, mean in zip(parts, found, gyro_mean, strict=True)

@@ -16,6 +16,7 @@ import numpy.typing as npt
 
 from vehnav.alignment import Rest
 from vehnav.classic import (
+    MECHANIZATIONS,
     Corrections,
     Drive,
     Outcome,
@@ -39,7 +40,7 @@ from vehnav.legs import (
     sensitivity,
 )
 from vehnav.rotation import angles_from_c_nb, c_from_rotvec, c_nb_from_angles
-from vehnav.strapdown.enu import Solution, mechanize_enu
+from vehnav.strapdown.enu import Solution
 
 Array = npt.NDArray[np.float64]
 
@@ -273,12 +274,12 @@ def with_part_before(
     if outcome.accel_bias is not None:
         dvel = increments.dvel - outcome.accel_bias * increments.dt[:, None]
         increments = replace(increments, dvel=dvel)
-    back = mechanize_enu(
+    back = MECHANIZATIONS[drive.frame](
         increments.part(0, k0).reversed(),
         position=start.position,
         v_n=start.v_n,
         c_nb=outcome.c_nb[0],
-        vertical="clamp" if drive.vertical == "clamp" else "free",
+        vertical=drive.vertical,
         earth=drive.earth,
     )
     before = slice(None, 0, -1)  # reversed again, without the instant that both have

@@ -161,6 +161,7 @@ def run(log: Log, config: Config = DEFAULTS) -> Run:
         stops,
         ELLIPSOIDS[config.ellipsoid],
         config.vertical,
+        config.frame,
         config.levelling_rate,
     )
     gnss = log.gnss if config.gps != "none" else None

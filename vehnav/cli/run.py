@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from vehnav.logs.log import Log, ReadOptions
     from vehnav.pipeline import Run
 
-RESULTS = ("trajectory.csv", "report.json")
+RESULTS = ("trajectory.csv", "report.json", "report.html")
 """What every run writes into its folder."""
 RUN_FIELDS = (
     "axes", "accel_axes", "mount", "max_gap", "split", "method", "as_published", "levelling",
@@ -89,8 +89,8 @@ RUN_FIELDS = (
     help="Use nothing that looks ahead: no distribution over legs.",
 )  # fmt: skip
 @option(
-    "method", "--frame", type=click.Choice(["enu"]), default="enu", show_default=True,
-    help="Frame of the mechanization.",
+    "method", "--frame", type=click.Choice(["enu", "eci"]), default="enu", show_default=True,
+    help="Frame of the mechanization: local East-North-Up (paper 004) or inertial (paper 000).",
 )  # fmt: skip
 @option(
     "method", "--vertical", type=click.Choice(["clamp", "free"]), default="clamp",
@@ -208,6 +208,7 @@ def _write(result: Run, folder: Path, options: dict[str, Any], *, quiet: bool) -
     """Write the three files and what ``-o`` names; returns the document."""
     from vehnav.export.formats import write_trajectory
     from vehnav.report.document import document, write_document
+    from vehnav.report.html import write_html
 
     content = document(result)
     try:
@@ -220,8 +221,6 @@ def _write(result: Run, folder: Path, options: dict[str, Any], *, quiet: bool) -
             if path.suffix == ".json":
                 write_document(content, path)
             elif path.suffix == ".html":
-                from vehnav.report.html import write_html
-
                 write_html(result, content, path)
             else:
                 write_trajectory(
@@ -239,4 +238,4 @@ def _print(result: Run, folder: Path) -> None:
     from vehnav.report.summary import summary
 
     click.echo(summary(result))
-    click.echo(f"report     {folder / RESULTS[-1]}, {RESULTS[0]} beside it")
+    click.echo(f"report     {folder / RESULTS[-1]}, {RESULTS[0]} and {RESULTS[1]} beside it")
