@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from vehnav.logs.log import Gnss, Imu, Speed
+from vehnav.rotation import exact_degrees
 
 Array = npt.NDArray[np.float64]
 Bytes = npt.NDArray[np.uint8]
@@ -172,8 +173,8 @@ def gnss_topic(gnss: Gnss, name: str = "/gps/fix") -> Topic:
         covariance[:, ::4] = gnss.sigma_pos**2
     kind = np.full(n, 0 if gnss.sigma_pos is None else 2)
     place = [
-        ("<f8", np.degrees(gnss.lat)),
-        ("<f8", np.degrees(gnss.lon)),
+        ("<f8", exact_degrees(gnss.lat)),
+        ("<f8", exact_degrees(gnss.lon)),
         ("<f8", gnss.height),
         ("<f8", covariance),
         ("u1", kind),

@@ -48,6 +48,8 @@ class RouteHabits:
         s standing at the ends.
     stop_every, stop_length : float
         s from one stop to the next (0: none but those of the route), and how long each is.
+    cut : float
+        m by which a corner may be cut.
     tolerance : float
         m: points of the route nearer than this to the line of their neighbours are left out.
     """
@@ -62,6 +64,7 @@ class RouteHabits:
     last_stop: float = 20.0
     stop_every: float = 120.0
     stop_length: float = 15.0
+    cut: float = 4.0
     tolerance: float = 3.0
 
 
@@ -106,6 +109,15 @@ def turn_path(
     return float(weights @ np.sin(heading)), float(weights @ np.cos(heading)), program.duration
 
 
+def corner_room(angle: float, shorter_leg: float, habits: RouteHabits) -> float:
+    """How far from a corner, m, a turn may begin.
+
+    An arc that begins at the distance d cuts the corner by d tan(angle / 4).
+    """
+    cut = habits.cut / max(math.tan(0.25 * abs(angle)), 1e-9)
+    return min(0.45 * shorter_leg, cut)
+
+
 def corner_speed(angle: float, room: float, limit: float, habits: RouteHabits) -> float:
     """Fastest speed, m/s, at which a turn fits into ``room`` m on either side of the corner."""
 
@@ -147,9 +159,9 @@ def plan_corners(route: Route, habits: RouteHabits, *, earth: Ellipsoid = WGS84)
             stop = habits.stop_length if lengths[k - 1] > 60.0 else 0.0
         if stop:
             since_stop = 0.0
-        room = 0.45 * min(lengths[k - 1], lengths[k])
         limit = min(limits[k - 1], limits[k], 4.0 if stop else math.inf)
         angle = turn_between(headings[k - 1], headings[k])
+        room = corner_room(angle, min(lengths[k - 1], lengths[k]), habits)
         v = corner_speed(angle, room, limit, habits)
         corners.append(Corner(v, stop))
         reaches.append(turn_reach(angle, v, corner_rate(v, habits), habits.ease))
