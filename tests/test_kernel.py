@@ -98,6 +98,7 @@ for number in range(300):
     radii = earth.curvature_radii(lat, h, ellipsoid)
     for result in (
         rotation.cross(a, b), rotation.add(a, b), rotation.subtract(a, b), rotation.scale(k, a),
+        (rotation.dot(a, b),),
         rotation.mat_vec(m, a), rotation.mat_t_vec(m, a), rotation.mat_mat(m, n),
         rotation.rotation_coefficients(size), rotation.dcm_from_rotvec(phi), radii,
         (earth.normal_gravity(lat, h, ellipsoid),), earth.earth_rate(lat, ellipsoid),

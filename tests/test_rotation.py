@@ -167,6 +167,7 @@ def test_vector_kernels(a: Any, b: Any, k: float) -> None:
     ]:
         assert np.abs(plain(kernel)(a, b) - wanted).max() <= 2 * EPS * size
     assert np.abs(plain(rotation.scale)(k, a) - k * np.array(a)).max() <= EPS * size
+    assert abs(plain(rotation.dot)(a, b) - np.dot(a, b)) <= 6 * EPS * size
     assert np.abs(skew(a) @ b - np.cross(a, b)).max() <= 4 * EPS * size
 
 
