@@ -220,6 +220,21 @@ def quaternion_from_c(c: npt.ArrayLike) -> Array:
     return np.asarray(np.where(q[..., :1] < 0.0, -q, q))
 
 
+def exact_degrees(angle: npt.ArrayLike) -> Array:
+    """Degrees whose ``np.radians`` is the same float64 again, where there is such a number.
+
+    Angles that were read as degrees always have one, at most two steps of the last bit from
+    ``np.degrees``; a file written with it reads back bit for bit.
+    """
+    rad = np.asarray(angle, float)
+    nearest = np.degrees(rad)
+    below, above = np.nextafter(nearest, -np.inf), np.nextafter(nearest, np.inf)
+    best = nearest.copy()
+    for candidate in (np.nextafter(below, -np.inf), np.nextafter(above, np.inf), below, above):
+        best = np.where((np.radians(best) != rad) & (np.radians(candidate) == rad), candidate, best)
+    return np.asarray(best)
+
+
 def c_from_quaternion(q: npt.ArrayLike) -> Array:
     """Rotation matrix (..., 3, 3) of quaternions (..., 4) as (w, x, y, z); normalised first.
 

@@ -100,6 +100,17 @@ def _is_own_csv(path: Path) -> bool:
     return names >= OWN_COLUMNS and bool(names & ATTITUDE_COLUMNS)
 
 
+def is_trajectory(path: str | Path, options: ReadOptions | None = None) -> bool:
+    """Whether a file is a trajectory of vehnav, not a recording or a table of fixes.
+
+    By its suffix, for CSV by the names of its columns; ``columns`` or ``preset`` in the options
+    say that a CSV is not.
+    """
+    told = options is not None and (bool(options.columns) or options.preset is not None)
+    name = Path(path)
+    return name.suffix.lower() in ALWAYS or (not told and _is_own_csv(name))
+
+
 def load_track(path: str | Path, options: ReadOptions | None = None) -> Track:
     """Read a trajectory, a truth or fixes.
 
@@ -117,10 +128,8 @@ def load_track(path: str | Path, options: ReadOptions | None = None) -> Track:
         What is wrong with the file.
     """
     options = options or ReadOptions()
-    name = Path(path)
-    told = bool(options.columns) or options.preset is not None
-    if name.suffix.lower() in ALWAYS or (not told and _is_own_csv(name)):
-        return Track(str(path), read_trajectory(name), None)
+    if is_trajectory(path, options):
+        return Track(str(path), read_trajectory(path))
     gnss, findings = read_gnss(str(path), replace(options, gps_file=None, speed_file=None))
     if gnss.t_ns.size < 2:
         raise LogError(f"{path}: {gnss.t_ns.size} fixes; a track has at least two")
