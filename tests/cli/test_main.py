@@ -26,6 +26,7 @@ from vehnav.cli.common import (
     finish,
     input_options,
     json_option,
+    option,
     print_findings,
     print_json,
     progress,
@@ -49,6 +50,7 @@ def demo(monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
     @span_options
     @axes_options
     @stops_options
+    @option("method", "--reset/--no-reset", default=True, help="V := 0 at stops.")
     @strict_option
     @json_option
     def run(log: str, strict: bool, **kwargs: Any) -> None:
@@ -361,6 +363,21 @@ def test_config_errors_name_file_and_field(
     assert str(path) in result.stderr
     assert re.search(says, result.stderr), result.stderr
     assert demo == {}
+
+
+@pytest.mark.parametrize(
+    ("text", "reset"),
+    [("reset = false", False), ("no_reset = true", False), ("no_reset = false", True)],
+)
+def test_a_switch_by_either_name(
+    demo: dict[str, Any], tmp_path: Path, text: str, reset: bool
+) -> None:
+    path = tmp_path / "c.toml"
+    path.write_text(f"[method]\n{text}")
+    assert invoke("run", "x.csv", "--config", str(path)).exit_code == 0
+    assert demo["reset"] is reset
+    assert invoke("run", "x.csv", "--config", str(path), "--reset").exit_code == 0
+    assert demo["reset"] is True
 
 
 def test_missing_config_file(demo: dict[str, Any], tmp_path: Path) -> None:

@@ -44,8 +44,16 @@ class TableOption(click.Option):
     @property
     def key(self) -> str:
         """Its key in the table: the long name with underscores."""
-        long_name = next(name for name in self.opts if name.startswith("--"))
-        return long_name[2:].replace("-", "_")
+        return _as_key(next(name for name in self.opts if name.startswith("--")))
+
+    @property
+    def off_keys(self) -> list[str]:
+        """Keys that switch it off: ``no_levelling = true`` for ``--no-levelling``."""
+        return [_as_key(name) for name in self.secondary_opts if name.startswith("--")]
+
+
+def _as_key(long_name: str) -> str:
+    return long_name.removeprefix("--").replace("-", "_")
 
 
 def option(table: Table, *declarations: str, help: str, **kwargs: Any) -> Callable[[F], F]:

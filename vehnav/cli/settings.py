@@ -33,6 +33,7 @@ def load_config(ctx: click.Context, path: str) -> dict[str, Any]:
     """
     own = table_options(ctx.command)
     known = {**_options_of_run(ctx), **own}
+    switched_off = {name: target for target in known.values() for name in target.off_keys}
     values: dict[str, Any] = {}
     for table, entries in _read_toml(path).items():
         if table not in TABLES:
@@ -41,14 +42,14 @@ def load_config(ctx: click.Context, path: str) -> dict[str, Any]:
             raise ConfigError(f"{path}: {table} must be a table: [{table}]")
         for key, value in entries.items():
             where = f"{path}: [{table}] {key}"
-            target = known.get(key)
+            target = known.get(key) or switched_off.get(key)
             if target is None:
                 raise ConfigError(f"{where}: unknown key{_nearest(key, known)}")
             if target.table != table:
                 raise ConfigError(f"{where}: this key belongs in [{target.table}]")
             converted = _convert(target, value, ctx, where)
-            if key in own:
-                values[str(own[key].name)] = converted
+            if target.key in own:
+                values[str(own[target.key].name)] = converted if key in known else not converted
     return values
 
 
