@@ -20,9 +20,9 @@ FROZEN = {
     "circle": "a9d3864d34644aea",
     "shake": "154164b5936beb77",
     "town": "48e2d5bcdc6b5bfb",
-    "city": "ec5031ffffdd8537",
-    "paper002": "b9d5683c36cd41f0",
-    "motorway": "b910d325d6a8a350",
+    "city": "35cb4467deb3ac0c",
+    "paper002": "abe2935d4daad699",
+    "motorway": "f9b32f14ae83d26b",
     "polar": "e1aa21be33f5ab03",
     "flight": "fa88b4382992b7c8",
 }

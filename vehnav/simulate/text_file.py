@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -25,9 +26,9 @@ def write_columns(path: Path, names: Sequence[str], form: str, columns: Sequence
     with path.open("w", encoding="ascii", newline="\n") as stream:
         stream.write(",".join(names) + "\n")
         for k in range(0, rows, _ROWS):
-            block = list(zip(*(c[k : k + _ROWS] for c in lists), strict=True))
-            flat = tuple(value for row in block for value in row)
-            stream.write((form + "\n") * len(block) % flat)
+            block = [c[k : k + _ROWS] for c in lists]
+            flat = tuple(itertools.chain.from_iterable(zip(*block, strict=True)))
+            stream.write((form + "\n") * len(block[0]) % flat)
 
 
 def write_imu(path: Path, imu: Imu) -> None:

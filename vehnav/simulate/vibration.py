@@ -50,11 +50,10 @@ class Tones:
         first column only and turned on by the addition theorem.
         """
         if even:
-            carrier = self._carrier(t[:, 0])
-            turned = [carrier @ self._coefficients(float(d)) for d in t[0] - t[0, 0]]
-            both = np.stack(turned, axis=1).reshape(-1, 12)
+            rows = self._carrier(t[:, 0]) @ self._coefficients(t[0] - t[0, 0])
+            both = np.swapaxes(rows, 0, 1).reshape(-1, 12)
         else:
-            both = self._carrier(t.ravel()) @ self._coefficients(0.0)
+            both = self._carrier(t.ravel()) @ self._coefficients(np.zeros(1))[0]
         y, y_dot = both[:, :6], both[:, 6:]
         if self.envelope == "always":
             return y, y_dot
@@ -68,13 +67,16 @@ class Tones:
         phase = t[:, None] * self.omega
         return np.concatenate([np.cos(phase), np.sin(phase)], axis=1)
 
-    def _coefficients(self, later: float) -> Array:
-        """(2 m, 12): carrier at t -> values and derivatives at t + ``later``."""
+    def _coefficients(self, later: Array) -> Array:
+        """(p, 2 m, 12): carrier at t -> values and derivatives at t + ``later`` (p,)."""
         w = self.omega[:, None]
-        c, s = np.cos(w * later), np.sin(w * later)
+        phase = later[:, None, None] * w
+        c, s = np.cos(phase), np.sin(phase)
         cosine = c * self.cosine + s * self.sine
         sine = c * self.sine - s * self.cosine
-        return np.block([[cosine, w * sine], [sine, -w * cosine]])
+        values = np.concatenate([cosine, sine], axis=1)
+        rates = np.concatenate([w * sine, -w * cosine], axis=1)
+        return np.concatenate([values, rates], axis=2)
 
     @property
     def top(self) -> float:
@@ -169,4 +171,16 @@ def vehicle_tones(rng: np.random.Generator, strength: Strength) -> tuple[Tones, 
         )
         for factor, band, count, accel, rate, envelope in parts
     ]
-    return tuple(tones for tones, part in zip(drawn, parts, strict=True) if part[0] > 0.0)
+    kept = [tones for tones, part in zip(drawn, parts, strict=True) if part[0] > 0.0]
+    groups = ([t for t in kept if t.envelope == e] for e in ("moving", "always"))
+    return tuple(_merged(group) for group in groups if group)
+
+
+def _merged(group: list[Tones]) -> Tones:
+    """Tones of one envelope as one set."""
+    return Tones(
+        np.concatenate([t.omega for t in group]),
+        np.concatenate([t.cosine for t in group]),
+        np.concatenate([t.sine for t in group]),
+        group[0].envelope,
+    )
