@@ -1,0 +1,62 @@
+"""Outputs appear whole or not at all."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+from vehnav.export.atomic import atomic_path
+
+
+def names(folder: Path) -> list[str]:
+    return sorted(path.name for path in folder.iterdir())
+
+
+def test_the_file_appears_at_the_end(tmp_path: Path) -> None:
+    with atomic_path(tmp_path / "a.csv.gz") as temporary:
+        assert temporary.parent == tmp_path
+        assert temporary.suffix == ".gz"
+        temporary.write_text("new")
+        assert not (tmp_path / "a.csv.gz").exists()
+    assert names(tmp_path) == ["a.csv.gz"]
+    assert (tmp_path / "a.csv.gz").read_text() == "new"
+
+
+@pytest.mark.parametrize("error", [ValueError, KeyboardInterrupt])
+def test_after_an_error_the_old_file_is_there_and_nothing_else(
+    tmp_path: Path, error: type[BaseException]
+) -> None:
+    target = tmp_path / "a.csv"
+    target.write_text("old")
+    with pytest.raises(error), atomic_path(target) as temporary:
+        temporary.write_text("half")
+        raise error
+    assert names(tmp_path) == ["a.csv"]
+    assert target.read_text() == "old"
+
+
+def test_a_writer_that_writes_nothing_is_an_error(tmp_path: Path) -> None:
+    with pytest.raises(OSError), atomic_path(tmp_path / "a.csv"):
+        pass
+    assert names(tmp_path) == []
+
+
+@pytest.mark.skipif(os.name == "nt", reason="links and devices of POSIX")
+def test_links_are_followed_and_devices_kept(tmp_path: Path) -> None:
+    (tmp_path / "real.csv").write_text("old")
+    (tmp_path / "link.csv").symlink_to("real.csv")
+    with atomic_path(tmp_path / "link.csv") as temporary:
+        temporary.write_text("new")
+    assert (tmp_path / "link.csv").is_symlink()
+    assert (tmp_path / "real.csv").read_text() == "new"
+    with atomic_path("/dev/null") as device:
+        assert device == Path("/dev/null")
+        device.write_text("gone")
+    assert Path("/dev/null").is_char_device()
+
+
+def test_a_folder_that_is_not_there(tmp_path: Path) -> None:
+    with pytest.raises(FileNotFoundError), atomic_path(tmp_path / "none" / "a.csv") as temporary:
+        temporary.write_text("x")
