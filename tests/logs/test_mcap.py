@@ -363,7 +363,6 @@ def official(path: Path, source: str):
     "name",
     [
         "boston_apan/going_in_circles.mcap",
-        "kitti_oxts/2011_10_03_drive_0042.mcap",
         "mcap_by_others/rhoque_car_circles.mcap",
         "mcap_by_others/rosbagsrs_all_types_no_statistics.mcap",
         "mcap_by_others/hansmann_navsatfix_50min.mcap",

@@ -246,7 +246,8 @@ def find_messages(
     breaks = 0
     while stop < data.size:
         # the length of the last record may be what is wrong: its inside is searched, too
-        begin = starts[-1] + rec.MESSAGE_HEAD.itemsize if starts else stop + 1
+        last = max(starts[-1] if starts else stop, anchors[-1] if anchors else 0)
+        begin = last + (rec.MESSAGE_HEAD.itemsize if starts or anchors else 1)
         following = _resume(data, begin, known, trusted)
         if following is None:
             breaks += int(whole)

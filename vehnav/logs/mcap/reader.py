@@ -59,14 +59,16 @@ def read_mcap(path: str | Path, options: ReadOptions) -> Log:
     files = _files(place)
     rejected: dict[tuple[str, str], str] = {}
     late: _Late = {}
+    earlier: dict[Finding, None] = {}
     _keep_pages()
     while True:
         reading = _Reading(str(path), options, rejected, late)
         try:
             reading.read(files)
-            return reading.log()
+            return reading.log(list(earlier))
         except UnusableError as error:
             candidate = error.candidate
+            earlier.update(dict.fromkeys(reading.damage()))
             rejected[candidate.role.name, candidate.topic.name] = error.why
         except _LateDeclarationError:
             continue
@@ -209,8 +211,17 @@ class _Reading:
                 "undeclared-channel", f"{count} messages of channels never declared (ids {ids})"
             )
 
-    def log(self) -> Log:
+    def damage(self) -> list[Finding]:
+        """Damage of all files."""
+        return [finding for report in self.reports for finding in report.damage()]
+
+    def log(self, earlier: list[Finding]) -> Log:
         """What was read.
+
+        Parameters
+        ----------
+        earlier : list of Finding
+            Damage met where another topic was tried.
 
         Raises
         ------
@@ -225,7 +236,7 @@ class _Reading:
             )
         if not self.chosen:
             self.chosen, self.notes = choose(self.path, topics, self.options, self.rejected)
-        damage = [finding for report in self.reports for finding in report.damage()]
+        damage = list(dict.fromkeys([*earlier, *self.damage()]))
         notes = [finding for report in self.reports for finding in report.notes()]
         return Assembler(self.path, topics, self.options).log(
             self.chosen, damage, [*notes, *self.notes]

@@ -13,8 +13,8 @@ from vehnav.logs.check import clean_gnss, clean_imu, clean_speed
 from vehnav.logs.log import Gnss, Imu, Log, ReadOptions, Speed
 from vehnav.logs.messages import choice, convert
 from vehnav.logs.messages.choice import Candidate
-from vehnav.logs.messages.roles import RoleName
-from vehnav.logs.messages.stamps import Clock, choose_clock
+from vehnav.logs.messages.roles import Role, RoleName
+from vehnav.logs.messages.stamps import CLOCK_SET_S, Clock, choose_clock, header_stamps
 from vehnav.logs.messages.topics import Collector, Topic
 from vehnav.units import ACCEL_UNITS, GYRO_UNITS, NS
 
@@ -22,6 +22,12 @@ SAME_CLOCK_S = 0.05
 """IMU and GPS stamps on one clock differ from log time by the same, to this."""
 OTHER_CLOCK_S = 2.0
 """No receiver is later than this: its header is on another clock."""
+
+
+MAX_RATE = 35.0
+"""rad/s: no gyro of a vehicle measures more (2000 deg/s)."""
+MAX_FORCE = 200.0
+"""m/s2: no accelerometer of a vehicle measures more (20 g)."""
 
 
 class UnusableError(Exception):
@@ -173,7 +179,17 @@ class Assembler:
             why = f"none of its {declared} messages could be decoded"
             why += f": {collector.decoder.problem}" if collector.decoder.problem else ""
             raise UnusableError(candidate, why)
-        return collector, collector.columns()
+        columns = collector.columns()
+        wrong = implausible(candidate.role, columns)
+        if wrong.any():
+            self.counts["read"] -= int(wrong.sum())
+            self.counts["bad"] += int(wrong.sum())
+            text = f"{self.path}: {candidate.label}: {int(wrong.sum())} messages from damaged "
+            text += "parts left out: stamps or values that cannot be"
+            span = (int(columns["log"][wrong].min()), int(columns["log"][wrong].max()))
+            self.findings.append(Finding("bad-messages", "error", text, *span))
+            columns = {name: values[~wrong] for name, values in columns.items()}
+        return collector, columns
 
     def _count_findings(self, candidate: Candidate, collector: Collector, declared: int) -> None:
         where = f"{self.path}: {candidate.label}"
@@ -227,6 +243,25 @@ class Assembler:
         self.findings.append(Finding("clock-offset", "warning", text))
         moved: npt.NDArray[np.int64] = columns["log"] - round(base.stats.offset_s / NS)
         return moved
+
+
+def implausible(role: Role, columns: dict[str, npt.NDArray[Any]]) -> npt.NDArray[np.bool_]:
+    """(n,): rows of damaged parts whose stamp or values no sound message could have."""
+    doubtful = columns.get("doubtful", np.zeros(columns["log"].size, np.bool_))
+    wrong = np.zeros(doubtful.size, np.bool_)
+    if not doubtful.any() or doubtful.all():
+        return wrong
+    header = header_stamps(role, columns)
+    if header is not None:
+        late = (columns["log"] - header) * NS
+        wrong |= np.abs(late - np.median(late[~doubtful])) > CLOCK_SET_S
+    if role.name == "imu" and role.sampling == "rates":
+        for name, limit in (("gyro", MAX_RATE), ("accel", MAX_FORCE)):
+            with np.errstate(invalid="ignore"):
+                size = np.abs(columns[name]).max(axis=1) * role.quantities[name].factor
+                wrong |= ~(size < limit)
+    wrong &= doubtful
+    return wrong
 
 
 def contents_row(topic: Topic) -> dict[str, Any]:

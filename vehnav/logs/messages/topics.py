@@ -57,6 +57,8 @@ class Collector:
         Messages delivered; of these from damaged parts; from parts with a wrong checksum; and
         messages that do not agree with their schema.
     bad_span, unverified_span : (first, last) log time or None
+    doubtful : list of (begin, end)
+        Rows from damaged parts or from parts with a wrong checksum.
     """
 
     role: Role
@@ -69,6 +71,7 @@ class Collector:
     bad: int = 0
     bad_span: tuple[int, int] | None = None
     unverified_span: tuple[int, int] | None = None
+    doubtful: list[tuple[int, int]] = field(default_factory=list)
 
     def add(self, batch: Batch, state: State) -> None:
         """Decode a batch and keep the result."""
@@ -80,6 +83,8 @@ class Collector:
             self.bad_span = _widen(self.bad_span, left)
         if not row.size:
             return
+        if state != "sound":
+            self.doubtful.append((self.read, self.read + row.size))
         self.read += row.size
         self.recovered += row.size if state == "recovered" else 0
         whole = row.size == batch.start.size
@@ -95,13 +100,31 @@ class Collector:
                 self.kept[name] = Column(values, self.expected)
 
     def columns(self) -> dict[str, npt.NDArray[Any]]:
-        """Everything kept, in order of log time; can be called once."""
+        """Everything kept, in order of log time; can be called once.
+
+        Rows from damaged parts are marked in a column "doubtful", where there are any.
+        """
         joined = {name: self.kept.pop(name).array() for name in list(self.kept)}
-        log = joined.get("log")
-        if log is not None and np.any(log[1:] < log[:-1]):
+        if "log" not in joined:
+            return joined
+        if self.doubtful:
+            joined["doubtful"] = np.zeros(self.read, np.bool_)
+            for begin, end in self.doubtful:
+                joined["doubtful"][begin:end] = True
+        log = _usable(joined["log"])
+        if np.any(log[1:] < log[:-1]):
             order = np.argsort(log, kind="stable")
             joined = {name: values[order] for name, values in joined.items()}
         return joined
+
+
+def _usable(log_ns: Ints) -> Ints:
+    """Log times to sort by: one that is zero or rolled over counts as the one before it."""
+    good = log_ns > 0
+    if good.all() or not good.any():
+        return log_ns
+    before = np.maximum.accumulate(np.where(good, np.arange(log_ns.size), -1))
+    return log_ns[np.where(before < 0, np.argmax(good), before)]
 
 
 def _widen(span: tuple[int, int] | None, times: Ints) -> tuple[int, int]:
