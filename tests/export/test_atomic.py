@@ -30,9 +30,14 @@ def test_after_an_error_the_old_file_is_there_and_nothing_else(
 ) -> None:
     target = tmp_path / "a.csv"
     target.write_text("old")
-    with pytest.raises(error), atomic_path(target) as temporary:
-        temporary.write_text("half")
-        raise error
+
+    def write() -> None:
+        with atomic_path(target) as temporary:
+            temporary.write_text("half")
+            raise error
+
+    with pytest.raises(error):
+        write()
     assert names(tmp_path) == ["a.csv"]
     assert target.read_text() == "old"
 
