@@ -301,6 +301,21 @@ def test_rows_that_are_not_numbers(tmp_path):
     assert log.damaged
 
 
+@pytest.mark.parametrize("at", [0, 3, N - 1])
+def test_a_long_row_anywhere(tmp_path, at):
+    """Two rows run together: pandas alone cuts them silently where the first row is one."""
+
+    def change(lines):
+        lines[1 + at] += "," + lines[1 + at]
+        return lines
+
+    log = read_csv(spoil(tmp_path, change), OPTIONS)
+    t, *_ = samples()
+    np.testing.assert_array_equal(log.imu.t_ns, np.delete(t, at))
+    (finding,) = log.findings
+    assert f"the first is line {at + 2})" in finding.text
+
+
 def test_an_empty_stamp_costs_one_row_and_no_digits(tmp_path):
     def change(lines):
         lines[7] = lines[7][lines[7].index(",") :]
@@ -544,3 +559,13 @@ def test_kitti(shared_data):
     gnss, _ = read_csv_gnss(stem + "_truth.csv", OPTIONS)
     assert gnss.t_ns[0] == 1_317_340_799_998_448_849  # nine decimals, not a float64
     assert gnss.v_n[0] == pytest.approx([-0.898412526, 5.446305752, -0.053087894])
+
+
+def test_a_stray_quotation_mark_costs_one_row(tmp_path):
+    def change(lines):
+        lines[6] = lines[6].replace(",", ',"', 1)
+        return lines
+
+    log = read_csv(spoil(tmp_path, change), OPTIONS)
+    t, *_ = samples()
+    np.testing.assert_array_equal(log.imu.t_ns, np.delete(t, 5))

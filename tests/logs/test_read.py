@@ -175,3 +175,27 @@ def test_files_that_vehnav_keeps_beside_a_csv(tmp_path):
     other = put(tmp_path / "other.csv", gps_text(1_700_000_005))
     named = read_log(path, ReadOptions(gps_file=other))
     assert named.gnss.t_ns[0] == 1_700_000_005_000_000_000
+
+
+@pytest.mark.parametrize(
+    ("mcap", "table", "gyro_scale", "accel_scale"),
+    [
+        ("boston_apan/driving.mcap", "boston_apan/driving_imu.csv", 1.0, 1.0),
+        ("drive_0708/drive_0708.mcap", "drive_0708/imu.csv", np.pi / 180.0, 9.80665),
+        (
+            "kitti_oxts/2011_10_03_drive_0042.mcap",
+            "kitti_oxts/2011_10_03_drive_0042_imu.csv",
+            1.0,
+            1.0,
+        ),
+    ],
+)
+def test_a_real_log_as_mcap_and_as_csv(shared_data, mcap, table, gyro_scale, accel_scale):
+    """The MCAPs were written by others from the same numbers, with the official writer."""
+    a = read_log(str(shared_data / mcap)).imu
+    b = read_log(str(shared_data / table)).imu
+    # six decimals of the CSV files, in their units; stamps to the microsecond
+    half_a_digit = 0.51e-6
+    assert np.max(np.abs(a.t_ns - b.t_ns)) <= 1000
+    np.testing.assert_allclose(a.gyro, b.gyro, atol=half_a_digit * gyro_scale, rtol=1e-15)
+    np.testing.assert_allclose(a.accel, b.accel, atol=half_a_digit * accel_scale, rtol=1e-15)

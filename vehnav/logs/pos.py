@@ -6,6 +6,7 @@ the kind of position and the separator.
 
 from __future__ import annotations
 
+import csv
 import re
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,6 +20,7 @@ from vehnav.logs.check import clean_gnss
 from vehnav.logs.clock import NO_TIME
 from vehnav.logs.gpstime import NS_PER_S, gps_from_week, unix_from_gps
 from vehnav.logs.log import Array, Gnss, ReadOptions, TimeArray
+from vehnav.logs.timebase import datetime_ns
 from vehnav.units import DEG
 
 if TYPE_CHECKING:
@@ -98,6 +100,9 @@ def read_pos(path: str, _: ReadOptions | None = None) -> tuple[Gnss, list[Findin
     frame = _parse(path, header, beginning)
     t_ns = _times(frame, header["clock"])
     numbers = {name: _numbers(frame[name]) for name in frame.columns if name[:4] != "time"}
+    lost = [name for name in form.position if name not in numbers]
+    if lost:
+        raise FormatError(f"{path}: the header names no column {', '.join(lost)}")
     lat, lon, height, c_en_rows = _position(numbers, form)
     gnss, findings = clean_gnss(
         t_ns,
@@ -140,10 +145,11 @@ def _parse(path: str, header: re.Match[str], beginning: str) -> pd.DataFrame:
             dtype=dict.fromkeys(times, str),
             encoding="latin-1",
             engine="c",
+            quoting=csv.QUOTE_NONE,
             index_col=False,
             skipinitialspace=True,
         )
-    except (pd.errors.ParserError, pd.errors.EmptyDataError) as error:
+    except ValueError as error:  # pandas derives its parser errors from it
         raise FormatError(f"{path}: rows do not have the columns of the header: {error}") from error
 
 
@@ -165,7 +171,7 @@ def _times(frame: pd.DataFrame, clock: str) -> TimeArray:
         if calendar.isna().any():  # without decimals
             plain = pd.to_datetime(first, format="%Y/%m/%d %H:%M:%S", errors="coerce")
             calendar = calendar.fillna(plain)
-        t_ns = np.asarray(calendar.dt.as_unit("ns").astype("int64"), np.int64)
+        t_ns = datetime_ns(calendar)
     else:
         week, tow = _numbers(first), _numbers(frame["time_1"])
         good = np.isfinite(week) & np.isfinite(tow) & (np.abs(week) < 1e4)

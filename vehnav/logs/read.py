@@ -166,8 +166,6 @@ def _as_text(beginning: bytes) -> str | None:
     """The beginning as text; None for binary bytes."""
     if beginning[:2] in (b"\xff\xfe", b"\xfe\xff"):
         return beginning.decode("utf-16", errors="replace")
-    if b"\0" in beginning:
-        return None
     text = beginning.decode("utf-8-sig", errors="replace")
     strange = sum(not (c.isprintable() or c in "\t\r\n\f") for c in text)
     return None if strange > 0.05 * len(text) else text

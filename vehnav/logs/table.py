@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 SAMPLE_BYTES: Final = 1 << 18
+SAMPLE_ROWS: Final = 50
 DELIMITERS: Final = ("\t", ";", "|", ",", " ")
 COMMENTS: Final = ("#", "%", "//")
 MAX_BAD_SHARE: Final = 0.5
@@ -53,8 +54,10 @@ class Sheet:
         The lines before the header.
     sample : tuple of tuple of str
         The fields of the first lines of numbers.
-    spaced : bool
-        Whether spaces follow the delimiters.
+    spaced, quoted : bool
+        Whether spaces follow the delimiters, and whether there are quotation marks.
+    long : tuple of int
+        Lines of the sample, counted from 0, that have more fields than there are names.
     """
 
     path: str
@@ -66,6 +69,8 @@ class Sheet:
     preamble: tuple[str, ...]
     sample: tuple[tuple[str, ...], ...]
     spaced: bool = False
+    quoted: bool = False
+    long: tuple[int, ...] = ()
 
 
 def sniff(path: str) -> Sheet:
@@ -88,12 +93,27 @@ def sniff(path: str) -> Sheet:
             "expected a table with one row per sample"
         )
     delimiter, decimal = form
-    sample = tuple(tuple(split(line, delimiter)) for line in lines[skip : skip + 50] if line)
+    sample = tuple(tuple(split(line, delimiter)) for line in lines[skip : skip + SAMPLE_ROWS])
+    sample = tuple(fields for fields in sample if any(fields))
     width = Counter(len(fields) for fields in sample).most_common(1)[0][0]
     names, preamble = _header(lines[:skip], delimiter, width)
     names += ("",) * (width - len(names))  # rows that end with a delimiter
-    spaced = delimiter != " " and f"{delimiter} " in "\n".join(lines[skip : skip + 50])
-    return Sheet(path, names, delimiter, decimal, skip, encoding, preamble, sample, spaced)
+    rows = lines[skip : skip + SAMPLE_ROWS]
+    pairs = Counter(line.count('"') % 2 for line in rows if '"' in line)
+    counts = [len(split(line, delimiter)) for line in rows]
+    return Sheet(
+        path,
+        names,
+        delimiter,
+        decimal,
+        skip,
+        encoding,
+        preamble,
+        sample,
+        spaced=delimiter != " " and f"{delimiter} " in "\n".join(rows),
+        quoted=pairs[0] > pairs[1],
+        long=tuple(skip + k for k, count in enumerate(counts) if count > len(names)),
+    )
 
 
 def _beginning(path: str) -> tuple[str, str, bool]:
@@ -170,6 +190,34 @@ def _header(
 # ---- parsing ---------------------------------------------------------------------------------
 
 
+def _parse(sheet: Sheet, **how: Any) -> pd.DataFrame:
+    """The rows of a sheet by the pandas C parser, columns named 0, 1, ..."""
+    import pandas as pd
+
+    form: dict[str, Any] = {"sep": sheet.delimiter, "skipinitialspace": sheet.spaced}
+    if sheet.delimiter == " ":
+        form = {"sep": r"\s+"}
+    if not sheet.quoted:  # a stray quotation mark must not swallow the rest of the file
+        form["quoting"] = csv.QUOTE_NONE
+    if sheet.encoding != "utf-8":
+        form["encoding"] = sheet.encoding
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", pd.errors.DtypeWarning)  # numbers() counts text
+        frame: pd.DataFrame = pd.read_csv(
+            sheet.path,
+            header=None,
+            names=list(range(len(sheet.names))),
+            # a long first row would make pandas cut all long rows silently
+            skiprows=[*range(sheet.skip), *sheet.long] if sheet.long else sheet.skip,
+            decimal=sheet.decimal,
+            engine="c",
+            index_col=False,
+            **form,
+            **how,
+        )
+    return frame
+
+
 class Table:
     """The rows of a sheet, parsed once.
 
@@ -187,7 +235,8 @@ class Table:
         self.sheet = sheet
         self.findings: list[Finding] = []
         # every column is parsed: with usecols pandas cuts long rows silently
-        self._frame, self._long = self._read()
+        self._frame, found = self._read()
+        self._long = sorted([line + 1 for line in sheet.long] + found)
         self.rows = len(self._frame)
         if not self.rows:
             raise FormatError(f"{sheet.path}: a header, but no rows")
@@ -202,41 +251,18 @@ class Table:
         """The frame, and the numbers of the lines that have too many fields."""
         import pandas as pd
 
-        sheet = self.sheet
-        form: dict[str, Any] = {"sep": sheet.delimiter, "skipinitialspace": sheet.spaced}
-        if sheet.delimiter == " ":
-            form = {"sep": r"\s+"}
-        if sheet.encoding != "utf-8":
-            form["encoding"] = sheet.encoding
-
-        def parse(**more: Any) -> pd.DataFrame:
-            with warnings.catch_warnings(record=True) as caught:
-                warnings.simplefilter("always")
-                frame: pd.DataFrame = pd.read_csv(
-                    sheet.path,
-                    header=None,
-                    names=list(range(len(sheet.names))),
-                    skiprows=sheet.skip,
-                    decimal=sheet.decimal,
-                    engine="c",
-                    index_col=False,
-                    on_bad_lines="warn",
-                    **form,
-                    **how,
-                    **more,
-                )
-            messages.extend(str(warning.message) for warning in caught)
-            return frame
-
-        messages: list[str] = []
         try:
-            frame = parse()
-        except UnicodeDecodeError:  # rare, and always to replace costs a tenth of the time
-            frame = parse(encoding_errors="replace")
-        except pd.errors.ParserError as error:
-            raise FormatError(f"{sheet.path}: not a table: {error}") from error
-        long_lines = re.findall(r"Skipping line (\d+)", "".join(messages))
-        return frame, [int(number) for number in long_lines]
+            return _parse(self.sheet, **how), []
+        except (UnicodeDecodeError, pd.errors.ParserError):
+            pass  # rare; to ask for more from the start costs a quarter of the time
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            try:
+                frame = _parse(self.sheet, on_bad_lines="warn", encoding_errors="replace", **how)
+            except pd.errors.ParserError as error:
+                raise FormatError(f"{self.sheet.path}: not a table: {error}") from error
+        messages = "".join(str(warning.message) for warning in caught)
+        return frame, [int(number) for number in re.findall(r"Skipping line (\d+)", messages)]
 
     def numbers(self, column: int) -> Array:
         """(rows,) float64: the column; text in it becomes NaN, counted with its first row."""
@@ -264,14 +290,16 @@ class Table:
         if series.dtype == np.float64 and not series.isna().any():
             return None
         # an empty or broken field kept pandas from reading integers; a float64 has 53 bits only
-        text = series if series.dtype != np.float64 else self._again(column, dtype=str)
-        if text is None:
+        read = series if series.dtype != np.float64 else self._again(column, dtype=str)
+        if read is None:
             return None
-        whole = text.str.fullmatch(r"\s*[+-]?\d{1,18}|[+-]?[1-8]\d{18}\s*").fillna(False)
-        good = whole.to_numpy(dtype=bool)
-        if good.sum() < (1.0 - MAX_BAD_SHARE) * text.notna().sum():
+        filled = read.notna().to_numpy()
+        text = read.astype(str).str.strip()
+        whole = text.str.fullmatch(r"[+-]?(\d{1,18}|[1-8]\d{18})").fillna(False)
+        good = whole.to_numpy(dtype=bool) & filled
+        if good.sum() < (1.0 - MAX_BAD_SHARE) * filled.sum():
             return None
-        self._note_text(column, np.flatnonzero(~good & text.notna().to_numpy()), text)
+        self._note_text(column, np.flatnonzero(~good & filled), read)
         values = np.full(self.rows, NO_TIME, np.int64)
         values[good] = text[good].astype("int64").to_numpy()
         return values

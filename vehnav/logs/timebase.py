@@ -143,5 +143,12 @@ def _dates(table: Table, column: Column) -> TimeArray:
 
 
 def datetime_ns(times: pd.Series[Any]) -> TimeArray:
-    """int64 ns of a pandas datetime column of any resolution; a missing one is ``NO_TIME``."""
-    return np.asarray(times.dt.as_unit("ns").astype("int64"), np.int64)
+    """int64 ns of a pandas datetime column of any resolution.
+
+    :data:`~vehnav.logs.clock.NO_TIME` where it is missing, or outside what nanoseconds can count.
+    """
+    if times.dt.unit == "ns":
+        return np.asarray(times.astype("int64"), np.int64)
+    micro = np.asarray(times.dt.as_unit("us").astype("int64"), np.int64)
+    good = np.abs(micro) < np.iinfo(np.int64).max // 1000
+    return _masked(np.where(good, micro, 0) * 1000, good & times.notna().to_numpy())
