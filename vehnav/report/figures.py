@@ -13,7 +13,6 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from vehnav.evaluation import Errors
 from vehnav.evaluation.reference import (
     COURSE_WINDOW,
     mean_motion,
@@ -23,9 +22,7 @@ from vehnav.evaluation.reference import (
 )
 from vehnav.logs.log import Gnss
 from vehnav.pipeline import METHODS, Run, corrections_of
-from vehnav.report.circle import radius_95
-from vehnav.report.scale import between_gaps, envelope, number
-from vehnav.trajectory import Trajectory
+from vehnav.report.scale import between_gaps, envelope
 from vehnav.units import NS
 
 Array = npt.NDArray[np.float64]
@@ -43,10 +40,6 @@ LEGEND: Final = {
     "default": "vehnav",
 }
 """Names of the methods beside their lines."""
-READABLE: Final = 3.0
-"""Times the own error that other curves may stretch the axis of the errors."""
-EXPECTED: Final = 6.0
-"""Times the own error that the expected one may stretch it."""
 
 
 @dataclass(frozen=True)
@@ -61,11 +54,14 @@ class Curve:
         ``ours``, ``gps``, ``published``, ``free``: decides the colour everywhere.
     parts : tuple of (x (n,), y (n,))
         Between gaps.
+    clock : tuple of (n,)
+        s, of every point of every part, where x is not the time.
     """
 
     name: str
     role: str
     parts: tuple[tuple[Array, Array], ...]
+    clock: tuple[Array, ...] = ()
 
     @property
     def largest(self) -> float:
@@ -112,8 +108,8 @@ class Panel:
     title, unit, x_title, note : str
     x_range, y_range : (float, float)
     curves, bands, spans : tuple
-    clock : (t (n,), x (n,)) or None
-        Where x is no time: the x at each time, for the linked cursor.
+    y_step : float
+        Between ticks; 0: a round one.
     """
 
     key: str
@@ -126,15 +122,10 @@ class Panel:
     bands: tuple[Band, ...] = ()
     spans: tuple[Span, ...] = ()
     note: str = ""
-    clock: tuple[Array, Array] | None = None
+    y_step: float = 0.0
 
 
-def panels(run: Run) -> list[Panel]:
-    """The plots over time of a run, those that its log supports."""
-    return [error_panel(run), east_velocity_panel(run), speed_panel(run)]
-
-
-# ---- curves ------------------------------------------------------------------------------------
+# ---- what a run has ----------------------------------------------------------------------------
 
 
 def log_seconds(run: Run, t_ns: TimeArray) -> Array:
@@ -203,116 +194,3 @@ def inside(run: Run, gnss: Gnss) -> npt.NDArray[np.bool_]:
     """(m,) the fixes within the time of the solution."""
     t = run.trajectory.t_ns
     return np.asarray((gnss.t_ns >= t[0]) & (gnss.t_ns <= t[-1]))
-
-
-# ---- panels ------------------------------------------------------------------------------------
-
-
-def error_panel(run: Run) -> Panel:
-    """Horizontal error against GPS over time, with the circle that was expected."""
-    curves = []
-    judged = [errors for errors in (run.errors_before, run.errors) if errors is not None]
-    own = [p for errors in judged for p in _error_curve(run, errors, "", "").parts]
-    if own:
-        curves.append(Curve(own_name(run), "ours", tuple(own)))
-    for name, role in others(run, ("as_published", "free")):
-        if name in run.method_errors:
-            curves.append(_error_curve(run, run.method_errors[name], LEGEND[name], role))
-    band = expected_band(run)
-    high = _error_axis(curves, band)
-    title = "Horizontal error against GPS" if judged else "Expected horizontal error"
-    return Panel(
-        "error", title, "m", "s", time_range(run), (0.0, high), tuple(curves),
-        () if band is None else (band,), spans(run), _off_axis(curves, (0.0, high), "m"),
-    )  # fmt: skip
-
-
-def _error_curve(run: Run, errors: Errors, name: str, role: str) -> Curve:
-    return curve(name, role, log_seconds(run, errors.t_ns), errors.horizontal)
-
-
-def expected_band(run: Run) -> Band | None:
-    """What the error stays under with 95 % probability, as a user without GPS knows it."""
-    track = run.trajectory
-    if track.sigma_pos is None:
-        return None
-    t, high = log_seconds(run, track.t_ns), radius_95(track.sigma_pos[:, :2])
-    keep = envelope(t, high, BINS)
-    return Band("expected, 95 %", t[keep], np.zeros(keep.size), high[keep])
-
-
-def _error_axis(curves: list[Curve], band: Band | None) -> float:
-    """Top of the error axis: the own error whole, the others as far as it stays readable."""
-    expected = 0.0 if band is None else float(band.high.max())
-    own = max((c.largest for c in curves if c.role == "ours"), default=expected)
-    rest = [min(c.largest, READABLE * own) for c in curves if c.role == "published"]
-    return ROOM * max([own, min(expected, EXPECTED * own), *rest, 1e-3])
-
-
-def _off_axis(curves: list[Curve], y_range: tuple[float, float], unit: str) -> str:
-    """Says of each curve that leaves the picture when it does and how far it goes."""
-    notes = []
-    for item in curves:
-        for x, y in item.parts:
-            out = (y < y_range[0]) | (y > y_range[1])
-            if np.any(out):
-                far = number(float(f"{item.largest:.3g}"), 0.1 if item.largest < 100.0 else 1.0)
-                notes.append(
-                    f"{item.name} leaves the picture at {x[np.argmax(out)]:.0f} s and reaches "
-                    f"{far} {unit}"
-                )
-                break
-    return "; ".join(notes)
-
-
-def east_velocity_panel(run: Run) -> Panel:
-    """East velocity against GPS with and without the procedures: figure 1 of paper 002."""
-    return _velocity_panel(run, "east-velocity", "East velocity", 0)
-
-
-def _velocity_panel(run: Run, key: str, title: str, axis: int) -> Panel:
-    track = run.trajectory
-    curves = []
-    if run.log.gnss is not None:
-        within = inside(run, run.log.gnss)
-        t = log_seconds(run, run.log.gnss.t_ns[within])
-        curves.append(curve("GPS", "gps", t, gps_velocity(run.log.gnss)[within, axis]))
-    for name, role in others(run, ("free", "as_published")):
-        other = run.variants[name]
-        curves.append(curve(LEGEND[name], role, log_seconds(run, other.t_ns), other.v_n[:, axis]))
-    own = curve(own_name(run), "ours", log_seconds(run, track.t_ns), track.v_n[:, axis])
-    curves.append(own)
-    y_range = _readable_range([c for c in curves if c.role in ("gps", "ours")])
-    note = _off_axis(curves, y_range, "m/s")
-    return Panel(
-        key, title, "m/s", "s", time_range(run), y_range, tuple(curves), (), spans(run), note
-    )
-
-
-def _readable_range(curves: list[Curve]) -> tuple[float, float]:
-    """Of the curves that must be seen whole, with some room around."""
-    low = min(c.bounds[0] for c in curves)
-    high = max(c.bounds[1] for c in curves)
-    room = 0.15 * max(high - low, 0.5)
-    return low - room, high + room
-
-
-def speed_panel(run: Run) -> Panel:
-    """Horizontal speed, own and GPS."""
-    track = run.trajectory
-    curves = []
-    if run.log.gnss is not None:
-        within = inside(run, run.log.gnss)
-        speed = np.hypot(*gps_velocity(run.log.gnss)[within].T)
-        curves.append(curve("GPS", "gps", log_seconds(run, run.log.gnss.t_ns[within]), speed))
-    own = np.hypot(track.v_n[:, 0], track.v_n[:, 1])
-    curves.append(curve(own_name(run), "ours", log_seconds(run, track.t_ns), own))
-    high = ROOM * max(max(c.largest for c in curves), 0.5)
-    return Panel(
-        "speed", "Speed", "m/s", "s", time_range(run), (0.0, high), tuple(curves), (), spans(run)
-    )
-
-
-def track_enu(track: Trajectory, origin: tuple[float, float, float]) -> Array:
-    """(n, 2) m: east and north from the origin."""
-    return track.enu(origin)[:, :2]

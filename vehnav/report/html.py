@@ -12,10 +12,10 @@ from typing import Any
 from vehnav._version import __version__
 from vehnav.export.atomic import atomic_path
 from vehnav.pipeline import Run
-from vehnav.report import sections
-from vehnav.report.figures import panels
+from vehnav.report import quality, sections
 from vehnav.report.mapping import map_of
 from vehnav.report.markup import esc
+from vehnav.report.panels import panels
 from vehnav.report.svg import map_figure, panel
 
 
@@ -45,8 +45,14 @@ def render_html(run: Run, document: Mapping[str, Any], *, command: str | None = 
         _header(run, document),
         f'<main><div class="linked"><div class="left">{map_figure(map_of(run))}</div>'
         f'<div class="right">{_panels(run)}</div></div>',
-        _section("methods", "Methods compared", sections.methods_table(run), METHODS_NOTE),
+        _judged(run),
         _section("stops", "What each stop corrected", sections.stops_table(document), STOPS_NOTE),
+        _section(
+            "sensor",
+            "The sensor at rest",
+            quality.sensor_table(run),
+            f"{SENSOR_NOTE} {esc(quality.fit_note(document))}",
+        ),
         _section("findings", "Findings", sections.findings_list(document)),
         _section("start", "Start and use of GPS", sections.start_details(run, document)),
         _section("input", "Recording", sections.input_details(document)),
@@ -70,6 +76,32 @@ STOPS_NOTE = (
 
 def _panels(run: Run) -> str:
     return "".join(panel(item, explained=k == 0) for k, item in enumerate(panels(run)))
+
+
+SENSOR_NOTE = (
+    "From the stops of this log: white noise by the differences of one-second means, and the "
+    "standard deviation of the mean rate over the stops."
+)
+
+
+def _judged(run: Run) -> str:
+    """The tables against GPS, side by side where there is room."""
+    blocks = [
+        ("methods", "Methods compared", quality.methods_table(run), METHODS_NOTE),
+        ("outages", "Outages bridged", quality.outages_table(run), ""),
+        ("since", "Growth since the last correction", quality.drift_table(run), ""),
+        ("segments", "Over lengths of road", quality.segments_table(run), SEGMENTS_NOTE),
+        ("honest", "Are the expected errors honest?", quality.calibration_table(run), HONEST_NOTE),
+    ]
+    return f'<div class="blocks">{"".join(_section(*block) for block in blocks)}</div>'
+
+
+SEGMENTS_NOTE = "Mean error of the displacement over every stretch of that length, as in KITTI."
+HONEST_NOTE = (
+    "Shares of the judged fixes inside multiples of the expected sigma, the receiver's own sigma "
+    "included where it gives one. The fixes of one drive are not independent: a single drive shows "
+    "rough agreement at best."
+)
 
 
 def _section(key: str, title: str, content: str, note: str = "") -> str:

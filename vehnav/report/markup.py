@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import html
+import re
 import unicodedata
 from collections.abc import Iterable, Sequence
 
@@ -30,6 +31,11 @@ def _visible(c: str) -> str:
     return f"\\u{ord(c):04x}"
 
 
+def _unit_kept(head: str) -> str:
+    """The last word of a head, its unit, kept in one piece and with the word before it."""
+    return re.sub(r" (\S{1,2})$", "\u00a0\\1", head).replace("/", "/\u2060")
+
+
 def table(
     head: Sequence[str],
     rows: Iterable[Sequence[str]],
@@ -44,7 +50,7 @@ def table(
     """
     sides = ["l" if k in left else "r" for k in range(len(head))]
     cells = "".join(
-        f'<th scope="col" class="{side}">{text}</th>'
+        f'<th scope="col" class="{side}">{_unit_kept(text)}</th>'
         for side, text in zip(sides, head, strict=True)
     )
     lines = []

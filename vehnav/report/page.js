@@ -28,14 +28,24 @@
     return value.toFixed(digits).replace("-", "\u2212");
   };
 
+  // Parts {x, y} with the times t that the path carries, if it does.
+  const withTimes = (path, parts) => {
+    if (!path.dataset.t) return parts;
+    const times = list(path.dataset.t);
+    let k = 0;
+    return parts.map((part) => ({ ...part, t: part.x.map(() => times[k++]) }));
+  };
+  const covering = (parts, t) => parts.find(({ t: ts }) => t >= ts[0] && t <= ts[ts.length - 1]);
+
   const panels = all(".panel").map((figure) => {
     const data = figure.dataset;
     const [x0, x1, y0, y1] = [data.x0, data.x1, data.y0, data.y1].map(Number);
     const outputs = all("output", figure);
-    const curves = all("path.curve", figure).map((path) => readPath(path).map((part) => [
-      part.map(([x]) => x0 + x / WIDTH * (x1 - x0)),
-      part.map(([, y]) => y0 + (1 - y / HEIGHT) * (y1 - y0)),
-    ]));
+    const curves = all("path.curve", figure).map((path) => withTimes(path, readPath(path).map((part) => ({
+      x: part.map(([x]) => x0 + x / WIDTH * (x1 - x0)),
+      y: part.map(([, y]) => y0 + (1 - y / HEIGHT) * (y1 - y0)),
+    }))));
+    const timed = curves.find((parts) => parts.length && parts[0].t);
     // The band is drawn first but stands last in the legend.
     const bands = all("path.c-expected", figure).length;
     return {
@@ -43,7 +53,8 @@
       unit: figure.querySelector("h3 small").textContent,
       plot: figure.querySelector(".plot"), cursor: figure.querySelector(".cursor"),
       curves: [...curves.slice(bands), ...curves.slice(0, bands)],
-      times: list(data.t), places: list(data.x),
+      // Where x is not the time: the parts that tell the x of a time.
+      timed: timed ?? null,
     };
   });
 
@@ -52,30 +63,31 @@
   const box = map.querySelector("svg").viewBox.baseVal;
   const readout = map.querySelector(".readout");
   const tracks = all("path.curve", map).map((path) => {
-    const times = list(path.dataset.t);
-    let k = 0;
-    const parts = readPath(path).map((part) => ({
-      t: part.map(() => times[k++]), x: part.map(([x]) => x), y: part.map(([, y]) => y),
-    }));
+    const parts = withTimes(path, readPath(path).map((part) => ({
+      x: part.map(([x]) => x), y: part.map(([, y]) => y),
+    })));
     const role = [...path.classList].find((name) => name.startsWith("c-"));
     return { path, role, parts, dot: map.querySelector(`.dot.${role}`) };
   });
 
   const show = (t) => {
     for (const panel of panels) {
-      const x = panel.times.length ? interpolate(panel.times, panel.places, t) : t;
+      const leg = panel.timed && covering(panel.timed, t);
+      const x = !panel.timed ? t : leg ? interpolate(leg.t, leg.x, t) : null;
       const seen = x !== null && x >= panel.x0 && x <= panel.x1;
       panel.cursor.style.display = seen ? "block" : "none";
       if (seen) panel.cursor.style.left = `${(x - panel.x0) / (panel.x1 - panel.x0) * 100}%`;
       panel.outputs.forEach((output, k) => {
         let value = null;
-        if (seen) for (const [xs, ys] of panel.curves[k]) value = interpolate(xs, ys, x) ?? value;
+        for (const part of seen ? panel.curves[k] : []) {
+          value = (part.t ? interpolate(part.t, part.y, t) : interpolate(part.x, part.y, x)) ?? value;
+        }
         output.textContent = value === null ? "" : written(value, panel.step);
       });
     }
     for (const { parts, dot } of tracks) {
       if (!dot) continue;
-      const part = parts.find(({ t: ts }) => t >= ts[0] && t <= ts[ts.length - 1]);
+      const part = covering(parts, t);
       dot.style.display = part ? "block" : "none";
       if (!part) continue;
       dot.style.left = `${interpolate(part.t, part.x, t) / box.width * 100}%`;
@@ -95,7 +107,21 @@
   const clamp = (x, low, high) => Math.min(Math.max(x, low), high);
 
   for (const panel of panels) {
-    const toTime = (x) => panel.times.length ? interpolate(panel.places, panel.times, x) : x;
+    // The instant of an x; of several the one that is nearest to the cursor.
+    const toTime = (x) => {
+      if (!panel.timed) return x;
+      const now = Number(document.documentElement.dataset.time ?? panels[0].x0);
+      let best = null;
+      for (const { t, x: xs } of panel.timed) {
+        for (let k = 0; k + 1 < xs.length; k++) {
+          const span = xs[k + 1] - xs[k];
+          if (x < Math.min(xs[k], xs[k + 1]) || x > Math.max(xs[k], xs[k + 1])) continue;
+          const at = span ? t[k] + (x - xs[k]) / span * (t[k + 1] - t[k]) : t[k];
+          if (best === null || Math.abs(at - now) < Math.abs(best - now)) best = at;
+        }
+      }
+      return best;
+    };
     const follow = (event) => {
       const frame = panel.plot.getBoundingClientRect();
       const share = clamp((event.clientX - frame.left) / frame.width, 0, 1);
@@ -114,11 +140,13 @@
     });
   }
 
-  // On the map: the nearest place on a track that is shown, and its instant.
-  const nearest = (x, y) => {
+  // On the map: the nearest place on a track that is shown, and its instant; where lines lie on one
+  // another (within `near`) it is the vehicle's own.
+  const nearest = (x, y, near) => {
     let best = Infinity, time = null;
-    for (const { path, parts } of tracks) {
+    for (const { path, role, parts } of [...tracks].reverse()) {
       if (path.classList.contains("hidden")) continue;
+      if (role !== "c-ours" && best < near * near) break;
       for (const part of parts) {
         for (let k = 0; k < part.t.length; k++) {
           const j = Math.min(k + 1, part.t.length - 1);
@@ -134,8 +162,8 @@
   const onMap = (event) => {
     if (event.target.dataset.at) { at(Number(event.target.dataset.at)); return; }
     const frame = mapPlot.getBoundingClientRect();
-    const t = nearest((event.clientX - frame.left) / frame.width * box.width,
-      (event.clientY - frame.top) / frame.height * box.height);
+    const unit = box.width / frame.width;
+    const t = nearest((event.clientX - frame.left) * unit, (event.clientY - frame.top) * unit, 6 * unit);
     if (t !== null) at(t);
   };
   mapPlot.addEventListener("pointermove", onMap);

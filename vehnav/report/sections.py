@@ -15,10 +15,10 @@ from vehnav.config import Config
 from vehnav.evaluation import Errors
 from vehnav.pipeline import Run
 from vehnav.report.circle import radius_95
-from vehnav.report.figures import own_method
 from vehnav.report.markup import esc, table
+from vehnav.report.quality import inside_share
 from vehnav.report.scale import number
-from vehnav.report.summary import METHOD_NAMES, metres
+from vehnav.report.summary import metres
 
 Document = Mapping[str, Any]
 
@@ -118,35 +118,11 @@ def _expected_figure(run: Run) -> tuple[str, str, str] | None:
     radius = radius_95(track.sigma_pos[:, :2])
     if run.errors is None:
         return "Expected error", metres(float(radius[-1])), "95 %, at the end"
-    share = 100.0 * float(np.mean(run.errors.horizontal <= radius))
+    share = 100.0 * (inside_share(run) or 0.0)
     return "Expected error", metres(float(radius[-1])), f"95 %; holds {share:.0f} % of the fixes"
 
 
 # ---- tables ------------------------------------------------------------------------------------
-
-
-def methods_table(run: Run) -> str:
-    """Every method by the same judge."""
-    if not run.method_errors:
-        return ""
-    rows: list[list[str]] = []
-    marked = None
-    for name, errors in run.method_errors.items():
-        found = errors.statistics()["horizontal_m"]
-        if found is None:
-            continue
-        percent = errors.percent_of_distance()["end"]
-        marked = len(rows) if name == own_method(run) else marked
-        figures = [metres(x) for x in (found.rms, found.p95, found.max, found.end)]
-        rows.append(
-            [
-                esc(METHOD_NAMES.get(name, name)),
-                *figures,
-                "" if percent is None else f"{percent:.1f}",
-            ]
-        )
-    head = ["horizontal error", "rms", "95 %", "largest", "at the end", "% of distance"]
-    return table(head, rows, name="Methods", marked=marked)
 
 
 def stops_table(document: Document) -> str:
@@ -188,8 +164,8 @@ def findings_list(document: Document) -> str:
         rows.append(
             [
                 f'<span class="level l-{level}">{level}</span>',
-                f"<code>{esc(item['code'])}</code>",
-                _when(item["start_s"], item["end_s"]),
+                f'<code class="word">{esc(item["code"])}</code>',
+                f'<span class="word">{_when(item["start_s"], item["end_s"])}</span>',
                 esc(item["text"]),
             ]
         )

@@ -41,13 +41,9 @@ def panel(item: Panel, *, explained: bool = True) -> str:
         ]
     )
     note = f'<p class="note">{esc(item.note)}</p>' if item.note else ""
-    clock = ""
-    if item.clock is not None:
-        t, x = item.clock
-        clock = f' data-t="{_numbers(t, 2)}" data-x="{_numbers(x, 1)}"'
     return (
         f'<figure class="panel" id="{esc(item.key)}" data-x0="{x0:.4f}" data-x1="{x1:.4f}" '
-        f'data-y0="{y0:.6g}" data-y1="{y1:.6g}" data-step="{_read_step(item):.3g}"{clock}>'
+        f'data-y0="{y0:.6g}" data-y1="{y1:.6g}" data-step="{_read_step(item):.3g}">'
         f"<figcaption><h3>{esc(item.title)} <small>{esc(item.unit)}</small></h3>"
         f"{_legend(item, explained)}</figcaption>"
         f'<div class="frame"><div class="plot" tabindex="0" role="img" '
@@ -86,7 +82,10 @@ def points(x: Array, y: Array) -> str:
 
 def _curve(item: Panel, c: Curve) -> str:
     d = "".join(points(_x(item, x), _y(item, y)) for x, y in c.parts if x.size)
-    return f'<path class="curve c-{esc(c.role)}" d="{d}"/>' if d else ""
+    clock = ""
+    if c.clock:
+        clock = f' data-t="{" ".join(_numbers(t, 2) for t in c.clock)}"'
+    return f'<path class="curve c-{esc(c.role)}"{clock} d="{d}"/>' if d else ""
 
 
 def _band(item: Panel, band: Band) -> str:
@@ -113,18 +112,25 @@ def _span(item: Panel, span: Span) -> str:
 
 def _grid(item: Panel) -> str:
     lines = [f"M{float(_x(item, x)):.0f} 0V{HEIGHT}" for x in ticks(*item.x_range, 10)]
-    lines += [f"M0 {float(_y(item, y)):.0f}H{WIDTH}" for y in ticks(*item.y_range, 5)]
+    lines += [f"M0 {float(_y(item, y)):.0f}H{WIDTH}" for y in _y_ticks(item)[0]]
     zero = ""
     if item.y_range[0] < 0.0 < item.y_range[1]:
         zero = f'<path class="zero" d="M0 {float(_y(item, 0.0)):.0f}H{WIDTH}"/>'
     return f'<path class="grid" d="{"".join(lines)}"/>{zero}'
 
 
+def _y_ticks(item: Panel) -> tuple[list[float], float]:
+    low, high = item.y_range
+    step = item.y_step or nice_step(high - low, 5)
+    first, last = int(np.ceil(low / step - 1e-9)), int(np.floor(high / step + 1e-9))
+    return [k * step for k in range(first, last + 1)], step
+
+
 def _labels(item: Panel) -> str:
     """Ticks beside the drawing; every other one on the x axis leaves a narrow screen."""
     out_x, out_y = [], []
-    y_ticks, x_ticks = ticks(*item.y_range, 5), ticks(*item.x_range, 10)
-    y_step, x_step = (nice_step(b - a, n) for (a, b), n in ((item.y_range, 5), (item.x_range, 10)))
+    y_ticks, y_step = _y_ticks(item)
+    x_ticks, x_step = ticks(*item.x_range, 10), nice_step(item.x_range[1] - item.x_range[0], 10)
     for y in y_ticks:
         top = float(_y(item, y)) / HEIGHT * 100.0
         out_y.append(f'<span style="top:{top:.2f}%">{number(y, y_step)}</span>')
