@@ -264,3 +264,40 @@ def test_counts_range_and_carried_rounding():
     small = corrupt(OMEGA * 0.02 * 0.7, FORCE * 0.02, sampling="increments", **kw)
     drift = np.cumsum(small.gyro, axis=0) - np.cumsum(OMEGA * 0.02 * 0.7, axis=0)
     assert np.max(np.abs(drift)) <= 0.5 * 0.01 * 0.02 + 1e-12  # half a count for ever
+
+
+def test_bandwidth_is_minus_3_db_and_45_degrees():
+    t = np.arange(20_000) * 0.0005
+    wave = np.sin(2.0 * math.pi * 5.0 * t)[:, None] * np.ones(3)
+    sensor = Sensor("slow", Triad(bandwidth=5.0), Triad())
+    m = corrupt(
+        wave,
+        wave,
+        t=t,
+        sensor=sensor,
+        errors=no_errors(),
+        rng=np.random.default_rng(0),
+        sampling="rates",
+    )
+    late = slice(4000, None)  # 2 s: the start has died away; whole periods
+    phasor = 2.0 * np.mean(m.gyro[late, 0] * np.exp(-2j * math.pi * 5.0 * t[late]))
+    assert abs(phasor) == pytest.approx(math.sqrt(0.5), rel=0.01)  # samples every 0.9 deg
+    assert np.angle(phasor) == pytest.approx(-0.75 * math.pi, abs=0.02)  # sine: -90, lag: 45
+    np.testing.assert_array_equal(m.accel, wave)
+
+
+def test_slow_processes_reach_the_output():
+    sensor = Sensor("drifting", Triad(bias_instability=3.0, bias_time=1e9), Triad(walk=0.5))
+    zero = np.zeros((1000, 3))
+    m = corrupt(
+        zero,
+        zero,
+        t=T,
+        sensor=sensor,
+        errors=no_errors(),
+        rng=run_rngs(9, 1500),
+        sampling="rates",
+    )
+    assert np.std(m.gyro[:, 500]) == pytest.approx(3.0, rel=0.05)
+    np.testing.assert_allclose(m.gyro[:, 0], m.gyro[:, -1], atol=0.01)  # frozen for 1e9 s
+    assert np.std(m.accel[:, -1]) == pytest.approx(0.5 * math.sqrt(T[-1]), rel=0.05)

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from vehnav.earth import position_difference
 from vehnav.logs.log import ReadOptions
 from vehnav.logs.read import read_log
+from vehnav.simulate import samples
 from vehnav.simulate.samples import SAMPLES, make_sample
 
 NAMES = [(name, sample) for sample in SAMPLES for name in sample.files]
@@ -50,3 +53,22 @@ def test_drives_stop_and_go(made):
         stopped = run.truth.stopped.astype(int)
         assert np.count_nonzero(np.diff(stopped) == -1) >= 3
         assert stopped[0] == stopped[-1] == 1
+
+
+def test_command_writes_what_it_is_told(tmp_path, monkeypatch, capsys):
+    short = replace(
+        SAMPLES[0],
+        files=("a.mcap", "a.csv"),
+        scenario="straight,duration=40,first_stop=5,last_stop=5",
+        rate_hz=10.0,
+    )
+    monkeypatch.setattr(samples, "SAMPLES", (short,))
+    monkeypatch.setattr("sys.argv", ["samples", str(tmp_path / "logs")])
+    samples.main()
+    names = sorted(p.name for p in (tmp_path / "logs").iterdir())
+    assert names == ["a.csv", "a.gps.csv", "a.mcap", "a.truth.csv"]
+    assert len((tmp_path / "logs" / "a.truth.csv").read_text().splitlines()) == 402
+    assert "a.mcap: 0." in capsys.readouterr().err
+    monkeypatch.setattr("sys.argv", ["samples"])
+    with pytest.raises(SystemExit, match="usage"):
+        samples.main()

@@ -234,3 +234,12 @@ def test_blocks_do_not_show(monkeypatch):
     assert isinstance(parts, Block)
     np.testing.assert_allclose(parts.states.lat, whole.states.lat, atol=1e-15)
     np.testing.assert_allclose(parts.dvel, whole.dvel, atol=1e-13)
+
+
+def test_velocity_is_that_of_the_course():
+    road = RoadMotion(drive(), (0.9, 0.2, 100.0), Body(), (slow_tones(),))
+    for motion in (road, PolarMotion(speed=30.0, miss=5.0, duration=20.0)):
+        t = np.arange(0.0, 20.0, 0.5)
+        states = ideal_record(motion, t, increments=False).states
+        velocity = motion.prepare(t[:, None], even=False).velocity()
+        np.testing.assert_allclose(velocity, states.v_n, atol=1e-12)
