@@ -11,7 +11,7 @@ from click.testing import CliRunner, Result
 from drives import Circle, trajectory_of
 
 from vehnav.cli.main import cli
-from vehnav.export import write_trajectory
+from vehnav.export import read_trajectory, write_trajectory
 
 
 def run(*args: object) -> Result:
@@ -157,6 +157,30 @@ def test_offset_auto_on_a_circle_tells_nothing(files) -> None:
     assert result.exit_code == 0
     assert "+0.000 s added" in result.stdout
     assert "gps-delay" in result.stderr
+
+
+def test_gps_in_any_format(files, tmp_path: Path) -> None:
+    """Our own exports come back as references: GPX (thinned to 0.2 m), Foxglove's MCAP, TUM."""
+    for suffix, within in ((".gpx", 0.01), (".mcap", 1e-3), (".tum", 1e-3), (".kitti", 1e-3)):
+        write_trajectory(read_trajectory(files["good"]), tmp_path / f"a{suffix}")
+        document = json.loads(run(files["off"], tmp_path / f"a{suffix}", "--json").stdout)
+        errors = document["trajectories"][0]["errors"]
+        assert errors["horizontal_m"]["rms"] == pytest.approx(5.0, abs=within), suffix
+        assert document["reference"]["file"].endswith(suffix)
+
+
+def test_what_the_reader_rejects_is_named(files, tmp_path: Path) -> None:
+    """A jump of 5 km and back in one second is no fix; it is counted, and does not judge."""
+    rows = files["gps"].read_text().splitlines()
+    fields = rows[50].split(",")
+    fields[1] = f"{float(fields[1]) + 0.045:.10f}"
+    (tmp_path / "jump.csv").write_text("\n".join([*rows[:50], ",".join(fields), *rows[51:], ""]))
+    result = run(files["off"], tmp_path / "jump.csv", "--json")
+    document = json.loads(result.stdout)
+    assert document["trajectories"][0]["fixes"]["total"] == 120
+    assert document["trajectories"][0]["errors"]["horizontal_m"]["max"] < 5.01
+    assert any("jump" in f["text"] for f in document["reference"]["findings"])
+    assert "jump" in result.stderr
 
 
 def test_wrong_inputs(files, tmp_path: Path) -> None:

@@ -24,6 +24,9 @@ from vehnav.cli.options import ParamType
 from vehnav.errors import ConfigError
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from vehnav.errors import Finding
     from vehnav.evaluation import Errors
     from vehnav.export.load import Track
 
@@ -155,7 +158,8 @@ def compare(files: tuple[str, ...], as_json: bool, strict: bool, **options: Any)
     documents = [_document(path, errors) for path, errors in zip(files[:-1], results, strict=True)]
     missed = _missed_bars(documents, options["bars"])
     if as_json:
-        print_json({"reference": files[-1], "trajectories": documents, "missed": missed})
+        reference = {"file": files[-1], "findings": _plain(tracks[-1].findings)}
+        print_json({"reference": reference, "trajectories": documents, "missed": missed})
     else:
         click.echo(screen(files, results, documents))
     findings = [f for t in tracks for f in t.findings] + [f for r in results for f in r.findings]
@@ -216,8 +220,12 @@ def _document(path: str, errors: Errors) -> dict[str, Any]:
         "start_unix_ns": int(errors.t_ns[0]),
         "duration_s": float(errors.t_ns[-1] - errors.t_ns[0]) * 1e-9,
         "errors": errors.to_dict(),
-        "findings": [{"code": f.code, "level": f.level, "text": f.text} for f in errors.findings],
+        "findings": _plain(errors.findings),
     }
+
+
+def _plain(findings: Sequence[Finding]) -> list[dict[str, str]]:
+    return [{"code": f.code, "level": f.level, "text": f.text} for f in findings]
 
 
 def _missed_bars(

@@ -107,13 +107,6 @@ class Errors:
         """(n,) m: size of the horizontal error."""
         return np.asarray(np.hypot(self.east, self.north))
 
-    @property
-    def percent(self) -> Array:
-        """(n,) horizontal error in percent of the distance so far; nan before 200 m."""
-        with np.errstate(divide="ignore", invalid="ignore"):
-            share = 100.0 * self.horizontal / self.distance
-        return np.where(self.distance >= PERCENT_FROM, share, np.nan)
-
     def statistics(self) -> dict[str, Statistics | None]:
         """The statistics of every series by its name in the report (``heading_deg`` in degrees)."""
         speed = None if self.velocity is None else np.hypot(*self.velocity[:, :2].T)
@@ -132,7 +125,8 @@ class Errors:
     def percent_of_distance(self) -> dict[str, float | None]:
         """Horizontal error in percent of the distance: at the end, and the largest after 200 m."""
         driven = float(self.distance[-1])
-        late = self.percent[self.distance >= PERCENT_FROM]
+        far = self.distance >= PERCENT_FROM
+        late = 100.0 * self.horizontal[far] / self.distance[far]
         return {
             "end": 100.0 * float(self.horizontal[-1]) / driven if driven >= MIN_DISTANCE else None,
             "max": float(np.max(late)) if late.size else None,

@@ -25,7 +25,7 @@ from vehnav.evaluation.segments import segment_errors
 from vehnav.evaluation.time_offset import TimeOffset, estimate_time_offset
 from vehnav.logs.log import Gnss
 from vehnav.rotation import angles_from_c_nb
-from vehnav.trajectory import Trajectory
+from vehnav.trajectory import Trajectory, interpolate_positions
 from vehnav.units import NS
 
 Array = npt.NDArray[np.float64]
@@ -155,7 +155,7 @@ def _series(
     )
     judged = fixes(gnss, matched.index)
     if align in ("none", "yaw"):
-        check_place(matched.states.lat, matched.states.lon, judged)
+        _same_place(trajectory, gnss)
     states, fit = aligned(matched.states, judged.lat, judged.lon, judged.height, align)
     t, path = (gnss.t_ns - gnss.t_ns[0]) * NS, path_distance(gnss)
     since = int(trajectory.t_ns[0]) if judge_from_ns is None else judge_from_ns
@@ -169,6 +169,17 @@ def _series(
         counts=MappingProxyType(matched.counts),
     )
     return _with_poses(_with_attitude(errors, c_ref), c_ref, fit)
+
+
+def _same_place(trajectory: Trajectory, gnss: Gnss) -> None:
+    """LogError where the tracks never come near, the fixes before judging included.
+
+    Free inertial drift reaches kilometres within minutes, but it starts where GPS was.
+    """
+    inside = (gnss.t_ns >= trajectory.t_ns[0]) & (gnss.t_ns <= trajectory.t_ns[-1])
+    near = fixes(gnss, np.flatnonzero(inside))
+    lat, lon, _ = interpolate_positions(trajectory, near.t_ns)
+    check_place(lat, lon, near)
 
 
 def _subtract(states: Trajectory, judged: Gnss, way: Array) -> Errors:
