@@ -59,7 +59,7 @@ def test_command_writes_what_it_is_told(tmp_path, monkeypatch, capsys):
     short = replace(
         SAMPLES[0],
         files=("a.mcap", "a.csv"),
-        scenario="straight,duration=40,first_stop=5,last_stop=5",
+        scenario="straight,duration=50,first_stop=5,last_stop=5",
         rate_hz=10.0,
     )
     monkeypatch.setattr(samples, "SAMPLES", (short,))
@@ -67,7 +67,7 @@ def test_command_writes_what_it_is_told(tmp_path, monkeypatch, capsys):
     samples.main()
     names = sorted(p.name for p in (tmp_path / "logs").iterdir())
     assert names == ["a.csv", "a.gps.csv", "a.mcap", "a.truth.csv"]
-    assert len((tmp_path / "logs" / "a.truth.csv").read_text().splitlines()) == 402
+    assert len((tmp_path / "logs" / "a.truth.csv").read_text().splitlines()) == 502
     assert "a.mcap: 0." in capsys.readouterr().err
     monkeypatch.setattr("sys.argv", ["samples"])
     with pytest.raises(SystemExit, match="usage"):
