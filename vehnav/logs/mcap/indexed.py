@@ -64,7 +64,9 @@ def read_summary(source: Source) -> Summary:
     if source.size < 2 * len(rec.MAGIC) + foot_size:
         raise FormatError("the file is too short to have been closed")
     tail = source.read(source.size - foot_size, foot_size)
-    opcode, length = rec.FRAME.unpack_from(tail)
+    if len(tail) < foot_size:
+        raise FormatError("the file shrank while it was read")
+    opcode, length = rec.frame(tail)
     if tail[-8:] != rec.MAGIC or (opcode, length) != (rec.FOOTER, 20):
         raise FormatError("the file was not closed: its end is missing")
     footer = rec.parse_footer(tail[9:29])
@@ -156,7 +158,7 @@ def _check_gaps(source: Source, places: list[ChunkIndex], data_end: int) -> None
             frame = source.read(at, 9)
             if len(frame) < 9:
                 raise FormatError("the data section is cut short")
-            opcode, length = rec.FRAME.unpack(frame)
+            opcode, length = rec.frame(frame)
             if opcode not in _BETWEEN and opcode < 0x80:
                 raise FormatError("messages or chunks outside of the index")
             at += 9 + length
@@ -234,7 +236,7 @@ def _chunk_record(source: Source, place: ChunkIndex) -> tuple[rec.ChunkHead, byt
         No chunk, or one that must not be unpacked.
     """
     beginning = source.read(place.start, 9 + 64)
-    opcode, size = rec.FRAME.unpack_from(beginning) if len(beginning) > 9 else (0, 0)
+    opcode, size = rec.frame(beginning) if len(beginning) > 9 else (0, 0)
     if opcode != rec.CHUNK or size + 9 != place.length:
         raise FormatError("no chunk where the index names one")
     head = rec.parse_chunk_head(beginning[9:])

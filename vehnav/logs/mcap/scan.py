@@ -15,6 +15,7 @@ from vehnav.logs.mcap import records as rec
 from vehnav.logs.mcap.delivery import Delivery, declare, deliver_chunk
 from vehnav.logs.mcap.records import Source
 from vehnav.logs.mcap.report import Report, signed
+from vehnav.logs.messages.topics import State
 
 WINDOW = 4 << 20
 MAX_RECORD = 256 << 20
@@ -24,13 +25,22 @@ _COMPRESSIONS = {0: b"", 3: b"lz4", 4: b"zstd"}
 
 
 class Scan:
-    """One pass over a file."""
+    """One pass over a file.
+
+    Attributes
+    ----------
+    closed : bool
+        Whether the end of a complete file was met.
+    lost_way : bool
+        Whether the framing broke since the last sound chunk or run of messages.
+    """
 
     def __init__(self, source: Source, delivery: Delivery, report: Report) -> None:
         self.source = source
         self.delivery = delivery
         self.report = report
         self.closed = False
+        self.lost_way = False
 
     def run(self) -> None:
         """Read everything; damage goes to the report."""
@@ -91,6 +101,7 @@ class Scan:
                 span=(signed(head.first_ns), signed(head.last_ns)),
             )
             return end if self.plausible(end) else self.search(at)
+        self.lost_way = False
         packed = self.source.read(inside, head.data_size)
         indexes, after = self.indexes_behind(end)
         content = chunks.unpack(head, packed)
@@ -138,7 +149,9 @@ class Scan:
         """Hand out the messages of a window; where to go on."""
         found = chunks.find_messages(data, known=self.delivery.known, indexes=[], whole=False)
         declare(self.delivery, data, found.others)
-        self.delivery.take(data, found.at, found.heads, "sound", count=True)
+        state: State = "recovered" if self.lost_way or found.breaks else "sound"
+        self.delivery.take(data, found.at, found.heads, state, count=True)
+        self.lost_way = False
         if suspect is None:
             return at + int(data.size)
         return self.search(at + suspect + rec.MESSAGE_HEAD.itemsize - 1)
@@ -162,6 +175,7 @@ class Scan:
 
     def lost(self, at: int, end: int) -> None:
         """Note bytes that could not be understood."""
+        self.lost_way = True
         self.report.note(
             "bytes-lost", f"{end - at} bytes from byte {at} on are not MCAP records; skipped"
         )

@@ -71,9 +71,10 @@ class Assembler:
         self.findings = [*damage, *notes]
         for role, candidate in chosen.items():
             candidate.topic.used_as.append(choice.NAMES[cast(RoleName, role)])
-        imu, clock = self._imu(chosen["imu"]) if "imu" in chosen else (None, None)
-        gnss = self._gnss(chosen["gnss"], clock) if "gnss" in chosen else None
-        speed = self._speed(chosen["speed"], clock) if "speed" in chosen else None
+        with np.errstate(invalid="ignore", over="ignore"):  # what is not finite is left out below
+            imu, clock = self._imu(chosen["imu"]) if "imu" in chosen else (None, None)
+            gnss = self._gnss(chosen["gnss"], clock) if "gnss" in chosen else None
+            speed = self._speed(chosen["speed"], clock) if "speed" in chosen else None
         lost = self.counts["declared"] > self.counts["read"]
         return Log(
             self.path,
@@ -257,9 +258,8 @@ def implausible(role: Role, columns: dict[str, npt.NDArray[Any]]) -> npt.NDArray
         wrong |= np.abs(late - np.median(late[~doubtful])) > CLOCK_SET_S
     if role.name == "imu" and role.sampling == "rates":
         for name, limit in (("gyro", MAX_RATE), ("accel", MAX_FORCE)):
-            with np.errstate(invalid="ignore"):
-                size = np.abs(columns[name]).max(axis=1) * role.quantities[name].factor
-                wrong |= ~(size < limit)
+            size = np.abs(columns[name]).max(axis=1) * role.quantities[name].factor
+            wrong |= ~(size < limit)
     wrong &= doubtful
     return wrong
 

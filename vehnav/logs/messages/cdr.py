@@ -77,12 +77,20 @@ Step = Fixed | String | Sequence | Unknown
 
 
 class Compiler:
-    """Turns a tree and the wanted leaves into steps, for one greatest alignment."""
+    """Turns a tree and the wanted leaves into steps, for one greatest alignment.
+
+    Attributes
+    ----------
+    reached : set of Path
+        Wanted numbers that the steps come to.
+    """
 
     def __init__(self, wanted: dict[Path, tuple[str, int]], max_align: int) -> None:
         self.wanted = wanted
         self.max_align = max_align
         self.left = MAX_PARTS
+        self.reached: set[Path] = set()
+        self._open = True
 
     def compile(self, root: Struct) -> tuple[Step, ...]:
         """Steps for a whole message."""
@@ -96,7 +104,7 @@ class Compiler:
             return [self._numbers(kind, 1, path)]
         if isinstance(kind, Text):
             quantity = self.wanted.get(path, ("", 0))[0]
-            return [Unknown("wstring") if kind.wide else String(quantity)]
+            return self._stop("wstring") if kind.wide else [String(quantity)]
         if isinstance(kind, Struct):
             return [step for name, inner in kind for step in self._steps(inner, (*path, name))]
         return self._array(kind, path)
@@ -111,8 +119,13 @@ class Compiler:
         if len(element) == 1 and isinstance(element[0], Fixed):
             return [Fixed(_repeat(element[0].advance, kind.length))]
         if kind.length * len(element) > 4096:
-            return [Unknown(f"array of {kind.length} structures of varying size")]
+            return self._stop(f"array of {kind.length} elements of varying size")
         return list(element) * kind.length
+
+    def _stop(self, what: str) -> list[Step]:
+        """A part that cannot be stepped over: nothing behind it is reached."""
+        self._open = False
+        return [Unknown(what)]
 
     def _numbers(self, kind: Scalar, count: int, path: Path) -> Fixed:
         if count * kind.size > MAX_FIXED_BYTES:
@@ -120,7 +133,8 @@ class Compiler:
         align = min(kind.size, self.max_align)
         pad = -_EIGHT % align if count else np.zeros(8, np.int64)
         leaves: tuple[Leaf, ...] = ()
-        if path in self.wanted:
+        if path in self.wanted and self._open:
+            self.reached.add(path)
             quantity, column = self.wanted[path]
             leaves = (Leaf(quantity, column, kind.code, count, pad),)
         return Fixed(pad + count * kind.size, leaves)

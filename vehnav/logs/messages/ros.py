@@ -40,11 +40,17 @@ class RosDecoder:
         self._wanted = wanted
         self._encapsulated = encapsulated
         self._plans: dict[int, tuple[Step, ...]] = {}
+        self._missing = False
 
     def plan(self, max_align: int) -> tuple[Step, ...]:
         """Steps for this greatest alignment."""
         if max_align not in self._plans:
-            self._plans[max_align] = Compiler(self._wanted, max_align).compile(self._root)
+            compiler = Compiler(self._wanted, max_align)
+            self._plans[max_align] = compiler.compile(self._root)
+            self._missing = any(
+                path not in compiler.reached and name != "frame"
+                for path, (name, _) in self._wanted.items()
+            )
         return self._plans[max_align]
 
     def decode(self, batch: Batch) -> Decoded:
@@ -80,7 +86,11 @@ class RosDecoder:
             order=order,
             max_align=max_align,
         )
-        whole = cursor.run(self.plan(max_align))
+        plan = self.plan(max_align)
+        if self._missing:
+            self.problem = "what is wanted lies behind a field of unknown wire format"
+            return Decoded(row[:0], {})
+        whole = cursor.run(plan)
         left = cursor.size - cursor.at
         good = (left >= 0) & (left <= PADDING) if whole else left >= 0
         if not good.all():
