@@ -94,9 +94,13 @@ def key_figures(run: Run) -> list[tuple[str, str, str]]:
         figures.append(("Largest error", metres(float(horizontal.max())), f"at {at:.0f} s"))
     elif run.errors_before is not None:
         before = float(run.errors_before.horizontal[0])
-        figures.append(("Error at the start", metres(before), "integrated backward"))
-    expected = _expected_figure(run)
-    figures += [expected] if expected else []
+        remark = "integrated backward"
+        if run.trajectory.sigma_pos is not None:
+            expected = float(radius_95(run.trajectory.sigma_pos[0, :2]))
+            remark += f"; expected {metres(expected)}"
+        figures.append(("Error at the start", metres(before), remark))
+    circle = _expected_figure(run)
+    figures += [circle] if circle else []
     free = run.method_errors.get("free")
     if free is not None and run.errors is not None:
         far, own = float(free.horizontal[-1]), float(run.errors.horizontal[-1])
