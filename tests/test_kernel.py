@@ -43,7 +43,7 @@ from vehnav import kernel, trial_loop
 value = trial_loop.loop(4)
 stats = getattr(trial_loop.loop, "stats", None)
 hits = sum(stats.cache_hits.values()) if stats else 0
-folder = kernel._cache_folder()
+folder = kernel._cache_folder("vehnav.trial_loop")
 print(json.dumps({"value": value, "hits": hits, "folder": folder and folder.name}))
 """
 SIX = 2.0 * (0 + 1 + 2 + 3)
@@ -152,7 +152,8 @@ def test_a_cache_that_cannot_be_written_is_done_without(copy: Path, tmp_path: Pa
 
 
 def test_old_folders_are_removed_but_for_the_newest(tmp_path: Path) -> None:
-    for age in range(8):
+    kept_others = kernel.KEPT_FOLDERS - 1
+    for age in range(kept_others + 5):
         folder = tmp_path / f"kernels-{age}"
         folder.mkdir()
         (folder / "code.nbi").touch()
@@ -163,31 +164,48 @@ def test_old_folders_are_removed_but_for_the_newest(tmp_path: Path) -> None:
     os.utime(current, (0, 0))  # whatever its age
     kernel._prune(current)
     kept = {path.name for path in tmp_path.iterdir()}
-    assert kept == {"kernels-current", "kernels-0", "kernels-1", "kernels-2", "something-else"}
-    assert kernel.KEPT_FOLDERS == 4
+    newest = {f"kernels-{age}" for age in range(kept_others)}
+    assert kept == {"kernels-current", "something-else"} | newest
 
 
 def test_a_new_source_prunes(copy: Path, tmp_path: Path) -> None:
     cache = tmp_path / "cache"
-    for age in range(6):
+    for age in range(kernel.KEPT_FOLDERS + 6):
         (cache / f"kernels-old{age}").mkdir(parents=True)
     run_loop(copy, cache)
     assert len(list(cache.iterdir())) == kernel.KEPT_FOLDERS
 
 
-def test_digest_sees_names_and_contents(tmp_path: Path) -> None:
-    (tmp_path / "deep").mkdir()
-    (tmp_path / "deep" / "a.py").write_text("x = 1")
-    seen = {kernel.source_digest(tmp_path)}
-    (tmp_path / "deep" / "a.py").write_text("x = 2")
-    seen.add(kernel.source_digest(tmp_path))
-    (tmp_path / "deep" / "a.py").rename(tmp_path / "deep" / "b.py")
-    seen.add(kernel.source_digest(tmp_path))
-    (tmp_path / "c.py").write_text("")
-    seen.add(kernel.source_digest(tmp_path))
-    assert len(seen) == 4
-    (tmp_path / "notes.txt").write_text("no source")
-    assert kernel.source_digest(tmp_path) in seen
+DIGESTS = """
+import json
+from vehnav import kernel
+print(json.dumps([kernel.source_digest("vehnav.trial_loop"), kernel.source_digest("vehnav.units")]))
+"""
+
+
+def test_digest_follows_the_imports_and_nothing_else(copy: Path) -> None:
+    """An edited callee, or a constant behind it, changes it; an edited command does not."""
+
+    def digests() -> list[str]:
+        found: list[str] = json.loads(python(DIGESTS, package=copy))
+        return found
+
+    first = digests()
+    with (copy / "cli" / "main.py").open("a") as file:
+        file.write("# edited\n")
+    assert digests() == first
+    with (copy / "units.py").open("a") as file:
+        file.write("SEVEN = 7\n")
+    alone = digests()
+    assert alone[0] == first[0]
+    assert alone[1] != first[1]
+    text = (copy / "trial_formula.py").read_text()
+    (copy / "trial_formula.py").write_text(f"from vehnav import units\n{text}")
+    reached = digests()
+    assert reached[0] != alone[0]
+    with (copy / "units.py").open("a") as file:
+        file.write("EIGHT = 8\n")
+    assert digests()[0] != reached[0]
 
 
 def test_cache_root_follows_the_system(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

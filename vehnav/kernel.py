@@ -6,8 +6,8 @@ equation; :func:`entry_kernel` for the loop that Python calls, whose machine cod
 
 numba's own disk cache looks at the file of the outermost function only: an edited constant or
 callee in a sibling file would give the OLD result silently. The cache here lives in a folder named
-by a digest of every Python source of the package, so it can never be stale; where no folder can
-be written, the code is compiled in memory. Folders of older sources are removed, but for the
+by a digest of every source that the loop can depend on, so it can never be stale; where no folder
+can be written, the code is compiled in memory. Folders of older sources are removed, but for the
 newest few.
 
 ``NUMBA_DISABLE_JIT=1`` runs everything as plain Python; without numba at all that is what happens,
@@ -19,6 +19,7 @@ from __future__ import annotations
 import functools
 import hashlib
 import os
+import re
 import shutil
 import sys
 import warnings
@@ -28,8 +29,8 @@ from typing import Any, TypeVar
 
 F = TypeVar("F", bound=Callable[..., Any])
 
-KEPT_FOLDERS = 4
-"""Compiled kernels of this many sources stay on disk (a few versions or checkouts side by side)."""
+KEPT_FOLDERS = 32
+"""Folders of compiled code that stay on disk: one per module with a loop, some versions of each."""
 
 try:
     import numba as _numba
@@ -44,14 +45,35 @@ except ImportError:
     )
 
 
-def source_digest(root: Path | None = None) -> str:
-    """Hexadecimal digest of every Python source of the package (names and contents)."""
-    root = root or Path(__file__).parent
+def source_digest(module: str) -> str:
+    """Hexadecimal digest of every source that compiled code of a module can depend on.
+
+    The sources are those of the module and of what it imports from its own package, directly or by
+    others; an edit anywhere else does not cost a compilation.
+    """
+    root = Path(__file__).parent
     digest = hashlib.sha256(sys.version.encode())
-    for path in sorted(root.rglob("*.py")):
-        digest.update(str(path.relative_to(root)).encode())
+    wanted, seen = [module], set()
+    while wanted:
+        name = wanted.pop()
+        path = root.joinpath(*name.split(".")[1:])
+        path = path / "__init__.py" if path.is_dir() else path.with_suffix(".py")
+        if path in seen or not path.is_file():
+            continue
+        seen.add(path)
+        for found in _IMPORT.finditer(path.read_text(encoding="utf-8")):
+            source, names = found["source"], re.findall(r"\w+", found["names"] or "")
+            wanted += [source, *(f"{source}.{x}" for x in names)]
+    for path in sorted(seen):
+        digest.update(path.relative_to(root).as_posix().encode())
         digest.update(path.read_bytes())
     return digest.hexdigest()[:20]
+
+
+_IMPORT = re.compile(
+    r"^\s*(?:from|import) (?P<source>vehnav[\w.]*)(?: import (?P<names>\([^)]*\)|[^\n]*))?",
+    re.MULTILINE,
+)
 
 
 def cache_root() -> Path:
@@ -68,10 +90,10 @@ def cache_root() -> Path:
 
 
 @functools.cache
-def _cache_folder() -> Path | None:
-    """A writable folder for this very source, or None."""
+def _cache_folder(module: str) -> Path | None:
+    """A writable folder for the code of a module as its sources are now, or None."""
     try:
-        folder = cache_root() / f"kernels-{source_digest()}"
+        folder = cache_root() / f"kernels-{source_digest(module)}"
         if not folder.is_dir():
             folder.mkdir(parents=True, exist_ok=True)
             _prune(folder)
@@ -110,7 +132,7 @@ def entry_kernel(func: F) -> F:
     if numba is None or numba.config.DISABLE_JIT:
         return func
     dispatcher = numba.njit(func, nogil=True)
-    if _cache_folder() is not None:
+    if _cache_folder(func.__module__) is not None:
         dispatcher._cache = _digest_cache(func)
     compiled: F = dispatcher
     return compiled
@@ -126,7 +148,7 @@ def _digest_cache(func: Callable[..., Any]) -> Any:
         """Where the machine code lies: the digest is in the path, so the stamp can be constant."""
 
         def get_cache_path(self) -> str:
-            return str(_cache_folder())
+            return str(_cache_folder(func.__module__))
 
         def get_source_stamp(self) -> str:
             return "digest-in-path"

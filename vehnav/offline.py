@@ -40,12 +40,15 @@ from vehnav.legs import (
     sensitivity,
 )
 from vehnav.rotation import angles_from_c_nb, c_from_rotvec, c_nb_from_angles
+from vehnav.stops import Stop
 from vehnav.strapdown.enu import Solution
 
 Array = npt.NDArray[np.float64]
 
 GRID = 0.1
 """s: the grid of the error equations along a leg."""
+ARRIVAL = 2.0
+"""s within which the last of the speed is gone after a stop began."""
 PASSES = 3
 """Times the errors of the legs are estimated and fed back: converged to 1 % on real logs."""
 
@@ -111,9 +114,9 @@ def distribute(
             drive, start, levelling=True, reset=True, bias=per_step, accel_bias=accel
         )
         first_found = first_found or solution
-        found = np.concatenate(
-            [solution.v_before_reset[1:, :2], solution.tilt_correction[1:]], axis=1
-        )
+        arrivals = [arrival_velocity(drive, solution, stop) for stop in drive.stops[1:]]
+        v_found = solution.v_before_reset[1:, :2] - np.array(arrivals).reshape(-1, 2)
+        found = np.concatenate([v_found, solution.tilt_correction[1:]], axis=1)
         grids = [_grid(drive, a, b) for a, b in legs]
         parts = [_sensitivity(drive, solution, k, i + 1, noise) for i, k in enumerate(grids)]
         errors, accel_more = fit_legs(parts, found, noise, gyro_applied=gyro, accel_applied=accel)
@@ -131,6 +134,22 @@ def distribute(
         drive.first, position, v_n, c_nb, stop_records(first_found or solution, seen),
         sigma_pos, sigma_heading, accel if legs else None,
     )  # fmt: skip
+
+
+def arrival_velocity(drive: Drive, solution: Solution, stop: Stop) -> Array:
+    """(2,) east, north m/s that the vehicle still has on the first instant of a stop.
+
+    A gentle arrival is quiet before it is over. What speed was left is what the accelerometers
+    show to vanish within the stop: minus the integral of the specific force less that of the rest.
+    """
+    t = drive.t[stop.first : stop.last + 1]
+    count = int(np.searchsorted(t, t[0] + min(ARRIVAL, 0.5 * stop.duration))) + 1
+    f = drive.f[stop.first : stop.first + count]
+    rest = drive.f[stop.first + t.size // 2 : stop.last + 1].mean(axis=0)
+    gained = np.trapezoid(f - rest, t[:count], axis=0)
+    heading, _, _ = angles_from_c_nb(solution.c_nb[stop.first - drive.first])
+    level = rest_of(drive, stop).c_nb(float(heading))
+    return np.asarray(-(level @ gained)[:2])
 
 
 def leg_spans(drive: Drive) -> list[tuple[int, int]]:
