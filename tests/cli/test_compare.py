@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -157,6 +159,33 @@ def test_offset_auto_on_a_circle_tells_nothing(files) -> None:
     assert result.exit_code == 0
     assert "+0.000 s added" in result.stdout
     assert "gps-delay" in result.stderr
+
+
+def test_what_the_screen_says_of_stops_sigmas_and_noise(files, tmp_path: Path) -> None:
+    """Standing at 0-20 s, then 20 m north of the fixes, sigma 30 m, fixes good to 0.5 m."""
+    made = read_trajectory(files["good"])
+    t = (made.t_ns - made.t_ns[0]) * 1e-9
+    lat = made.lat + np.where(t > 20.0, (t - 20.0) * 0.2, 0.0) / 6.37e6
+    sigma, angle = np.full((made.size, 3), 30.0), np.full(made.size, 0.01)
+    told = replace(made, lat=lat, stopped=t <= 20.0, sigma_pos=sigma, sigma_heading=angle)
+    write_trajectory(told, tmp_path / "told.csv")
+    rows = files["gps"].read_text().splitlines()
+    head = rows[0] + ",sigma_east_m,sigma_north_m,sigma_up_m"
+    text = "\n".join([head, *(f"{row},0.3,0.4,1" for row in rows[1:]), ""])
+    (tmp_path / "sure.csv").write_text(text)
+    shown = run(tmp_path / "told.csv", tmp_path / "sure.csv").stdout
+    assert "0.500 m uncertain" in shown
+    # 0.2 m/s since the end of the stop: 2, 6, 12 m after 10, 30, 60 s (meridian radius 6.36e6)
+    drift = next(line for line in shown.splitlines() if line.startswith("drift after"))
+    found = [float(x) for x in re.findall(r"s ([0-9.]+) m", drift)]
+    assert found == pytest.approx([2.0, 6.0, 12.0], rel=5e-3)
+    assert drift.endswith("(medians of 1 legs)")
+    assert "in 1,2,3 sigma 100 / 100 / 100 %" in shown
+    against_truth = json.loads(run(tmp_path / "told.csv", files["good"], "--json").stdout)
+    calibration = against_truth["trajectories"][0]["errors"]["calibration"]
+    assert calibration["rms"]["heading"] < 1e-3
+    bad = run(tmp_path / "told.csv", tmp_path / "sure.csv", "--gps-time-offset", "soon")
+    assert bad.exit_code == 2
 
 
 def test_gps_in_any_format(files, tmp_path: Path) -> None:

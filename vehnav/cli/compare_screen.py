@@ -118,7 +118,10 @@ def _more(tree: dict[str, Any]) -> list[str]:
     if tree["drift"] and tree["drift"]["by_time"]:
         rows = tree["drift"]["by_time"]
         parts = [f"{r['after_s']:.0f} s {number(r['median_m'])} m" for r in rows]
-        legs = f"(medians of {rows[0]['legs']} to {rows[-1]['legs']} legs)"
+        least, most = rows[-1]["legs"], rows[0]["legs"]
+        legs = (
+            f"(medians of {most} legs)" if least == most else f"(medians, {most} to {least} legs)"
+        )
         lines.append("drift after  " + "   ".join(parts[:SEVERAL]) + f"   {legs}")
     for row in tree["outages"]:
         lines.append(

@@ -62,11 +62,6 @@ class TimeOffset:
     sigma: float
     windows: int
 
-    @property
-    def significant(self) -> bool:
-        """Whether it differs from zero by more than three sigma."""
-        return abs(self.offset) > 3.0 * self.sigma
-
     def to_dict(self) -> dict[str, Any]:
         """The fields by their names in the report."""
         return {"offset_s": self.offset, "sigma_s": self.sigma, "windows": self.windows}
