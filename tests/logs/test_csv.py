@@ -569,3 +569,19 @@ def test_a_stray_quotation_mark_costs_one_row(tmp_path):
     log = read_csv(spoil(tmp_path, change), OPTIONS)
     t, *_ = samples()
     np.testing.assert_array_equal(log.imu.t_ns, np.delete(t, 5))
+
+
+@pytest.mark.parametrize("first", ["time_s", "gyro_z"])
+@pytest.mark.parametrize("tail", ["", "\n\n"])
+def test_nine_decimals_around_a_whole_second(tmp_path, first, tail):
+    """A float64 of ....999999999 s is the next second; the digits are not."""
+    _, gyro, accel = samples()
+    t = 1_700_000_000_999_999_990 + np.arange(N)
+    names = ["time_s", "gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z"]
+    stamps = [f"{v // 10**9}.{v % 10**9:09d}" for v in t]
+    columns = dict(zip(names, [stamps, *texts(gyro), *texts(accel)], strict=True))
+    order = sorted(names, key=lambda name: name != first)
+    path = write(tmp_path / "x.csv", ",".join(order), [columns[name] for name in order])
+    with (tmp_path / "x.csv").open("a") as file:
+        file.write(tail)
+    np.testing.assert_array_equal(read_csv(path, OPTIONS).imu.t_ns, t)

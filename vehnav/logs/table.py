@@ -21,6 +21,7 @@ import numpy.typing as npt
 
 from vehnav.errors import Finding, FormatError
 from vehnav.logs.clock import NO_TIME
+from vehnav.logs.digits import digits_at
 from vehnav.logs.log import Array, TimeArray
 
 if TYPE_CHECKING:
@@ -330,12 +331,29 @@ class Table:
         """
         if self.sheet.decimal != ".":
             return None
-        exact = self._again(column, dtype={column: np.int64}, thousands=".")
-        if exact is None:
+        values = self._from_digits(column, decimals)
+        if values is None:
+            exact = self._again(column, dtype={column: np.int64}, thousands=".")
+            values = None if exact is None else np.asarray(exact.to_numpy(), np.int64)
+        if values is None:
             return None
-        values: TimeArray = exact.to_numpy()
         rough = self.numbers(column) * 10.0**decimals
-        return values if np.allclose(values, rough, rtol=1e-12, atol=1.0) else None
+        near = np.max(np.abs(values - rough)) <= 1e-12 * np.max(np.abs(rough)) + 1.0
+        return values if near else None
+
+    def _from_digits(self, column: int, decimals: int) -> TimeArray | None:
+        """:meth:`fixed_point` of a first column of constant width, from the bytes of the file."""
+        sheet = self.sheet
+        places = {row[0].find(".") + 1 for row in sheet.sample}
+        if column or self._long or sheet.spaced or sheet.encoding != "utf-8" or len(places) > 1:
+            return None
+        (place,) = places
+        part = digits_at(sheet.path, skip=sheet.skip, rows=self.rows, place=place, count=decimals)
+        if part is None:
+            return None
+        scale = 10**decimals
+        whole = np.rint(self.numbers(column) - part / scale).astype(np.int64)
+        return np.asarray(whole * scale + part, np.int64)
 
     def text(self, column: int) -> pd.Series[Any]:
         """The column as it stands."""
