@@ -46,8 +46,7 @@ FOLDERS: Final = (
     Folder(
         "rosbag2 (SQLite)",
         lambda f: _has(f, "*.db3"),
-        refusal="a rosbag2 SQLite recording; convert it: pip install rosbags && "
-        "rosbags-convert --src {path} --dst {name}_mcap --dst-storage mcap",
+        log="vehnav.logs.rosbag:read_rosbag",
     ),
     Folder(
         "gnss-ins-sim",

@@ -69,14 +69,12 @@ FORMATS: Final = (
     Format(
         "ROS 1 bag",
         magic=(b"#ROSBAG V",),
-        refusal="a ROS 1 bag; convert it: pip install rosbags && "
-        "rosbags-convert --src {path} --dst {stem} --dst-storage mcap",
+        log="vehnav.logs.rosbag:read_rosbag",
     ),
     Format(
         "rosbag2 database",
         magic=(b"SQLite format 3\0",),
-        refusal="a rosbag2 SQLite database; convert its folder: pip install rosbags && "
-        "rosbags-convert --src {folder} --dst {stem}_mcap --dst-storage mcap",
+        log="vehnav.logs.rosbag:read_rosbag",
     ),
     Format("gzip", magic=(b"\x1f\x8b",), refusal=_UNPACK.format(command="gunzip {path}")),
     Format("zstd", magic=(b"\x28\xb5\x2f\xfd",), refusal=_UNPACK.format(command="zstd -d {path}")),
