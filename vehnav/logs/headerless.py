@@ -29,7 +29,8 @@ def _first_rows(sheet: Sheet, width: int) -> Array | None:
 def _seconds_of_week(t: Array, shortest: float, longest: float) -> bool:
     steps = np.diff(t)
     inside = bool(np.all((t >= 0.0) & (t <= WEEK_S)))
-    return inside and bool(np.all(steps > 0.0)) and shortest <= np.median(steps) <= longest
+    middle = float(np.median(steps))
+    return inside and bool(np.all(steps > 0.0)) and shortest <= middle <= longest
 
 
 def increments(sheet: Sheet) -> bool:
