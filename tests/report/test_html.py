@@ -134,7 +134,7 @@ def test_the_map_is_true_to_scale(page: str, city: Run) -> None:
     assert np.hypot(east, north) == pytest.approx(distance, abs=0.25)
     assert deg(np.arctan2(east, -north)) == pytest.approx(azimuth, abs=0.05)
     width = float(re.search(r'viewBox="0 0 (\d+) ', part)[1]) / 10.0  # type: ignore[index]
-    bar = re.search(r'class="scale" style="width:([\d.]+)%">(\d+) m<', part)
+    bar = re.search(r'class="scale \w+" style="width:([\d.]+)%">(\d+) m<', part)
     assert bar is not None
     assert float(bar[1]) / 100.0 * width == pytest.approx(float(bar[2]), rel=1e-3)
 

@@ -157,3 +157,31 @@ def test_tracks_can_be_shown_and_hidden(browser: Browser, page: Path) -> None:
     assert browser.run(seen) == "none"
     browser.run("document.querySelector('input[data-role=published]').click()")
     assert browser.run(seen) != "none"
+
+
+def test_zoom_keeps_scale_marks_and_cursor_in_place(
+    browser: Browser, page: Path, city: Run
+) -> None:
+    browser.open(page)
+    first, last = (city.trajectory.t_ns[[0, -1]] - city.start_ns) * 1e-9
+    stop = city.stops[1]
+    middle = 0.5 * (stop.start + stop.end)
+    box = browser.box("#speed .plot")
+    browser.point(box["x"] + (middle - first) / (last - first) * box["width"], box["y"] + 20.0)
+    for _ in range(3):  # about the vehicle, which stands at the stop
+        browser.run("document.querySelector('[data-zoom=\"2\"]').click()")
+    west, _, east, _ = map_of(city).box
+    size = "document.querySelector('.map svg').viewBox.baseVal.width / 10"
+    width = float(browser.run(size))
+    assert width == pytest.approx((east - west) / 8.0, rel=1e-3)
+    text = str(browser.run("document.querySelector('.scale').textContent"))
+    bar = "parseFloat(document.querySelector('.scale').style.width) / 100"
+    assert text.endswith(" m")
+    assert float(browser.run(bar)) * width == pytest.approx(float(text[:-2]), rel=1e-3)
+    mark = _share(browser, f'.map .mark[data-at="{middle:.2f}"]')
+    assert _share(browser, ".map .dot.c-ours") == pytest.approx(mark, abs=0.005)
+    assert all(0.0 < x < 1.0 for x in mark)
+    for _ in range(5):
+        browser.run("document.querySelector('[data-zoom=\"0.5\"]').click()")
+    assert float(browser.run(size)) == pytest.approx(east - west, abs=0.1)
+    assert browser.complaints == []

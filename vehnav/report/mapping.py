@@ -75,7 +75,8 @@ class Ellipse:
 class Map:
     """All that is on the map; ``box`` is west, south, east, north, m.
 
-    ``too_large``: how many ellipses are larger than the map.
+    ``too_large``: how many ellipses are larger than the map. ``scale_side``: the lower corner,
+    ``left`` or ``right``, that the tracks leave free for the scale bar.
     """
 
     box: Box
@@ -87,6 +88,7 @@ class Map:
     used: Track | None
     miss: tuple[tuple[float, float], tuple[float, float]] | None
     local: bool
+    scale_side: str
 
 
 def map_of(run: Run) -> Map:
@@ -114,6 +116,7 @@ def map_of(run: Run) -> Map:
         used=used,
         miss=_miss(run, origin),
         local=run.alignment.local,
+        scale_side=_free_side(np.concatenate(seen), box),
     )
 
 
@@ -211,6 +214,15 @@ def _miss(
     own = errors.states.rows(slice(-1, None)).enu(origin)[0]
     fix = local_enu(errors.lat[-1], errors.lon[-1], errors.height[-1], origin=origin)
     return (float(own[0]), float(own[1])), (float(fix[0]), float(fix[1]))
+
+
+def _free_side(places: Array, box: Box) -> str:
+    """The lower corner with fewer points of the tracks: 12 % of the height, 35 % of the width."""
+    west, south, east, north = box
+    low = places[places[:, 1] < south + 0.12 * (north - south), 0]
+    left = np.count_nonzero(low < west + 0.35 * (east - west))
+    right = np.count_nonzero(low > east - 0.35 * (east - west))
+    return "right" if right < left else "left"
 
 
 def _box(places: Array, ellipses: list[Ellipse]) -> Box:

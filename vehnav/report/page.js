@@ -60,7 +60,13 @@
 
   const map = document.querySelector(".map");
   const mapPlot = map.querySelector(".plot");
-  const box = map.querySelector("svg").viewBox.baseVal;
+  const drawing = map.querySelector("svg");
+  const { width: mapWidth, height: mapHeight } = drawing.viewBox.baseVal;
+  let view = { x: 0, y: 0, width: mapWidth, height: mapHeight };
+  const place = (element, x, y) => {
+    element.style.left = `${(x - view.x) / view.width * 100}%`;
+    element.style.top = `${(y - view.y) / view.height * 100}%`;
+  };
   const readout = map.querySelector(".readout");
   const tracks = all("path.curve", map).map((path) => {
     const parts = withTimes(path, readPath(path).map((part) => ({
@@ -90,8 +96,7 @@
       const part = covering(parts, t);
       dot.style.display = part ? "block" : "none";
       if (!part) continue;
-      dot.style.left = `${interpolate(part.t, part.x, t) / box.width * 100}%`;
-      dot.style.top = `${interpolate(part.t, part.y, t) / box.height * 100}%`;
+      place(dot, interpolate(part.t, part.x, t), interpolate(part.t, part.y, t));
     }
     const first = panels[0];
     const values = first.outputs[0] && first.outputs[0].textContent;
@@ -159,15 +164,73 @@
     }
     return time;
   };
+  let dragged = null;
   const onMap = (event) => {
+    if (event.target.dataset.zoom || dragged) return;
     if (event.target.dataset.at) { at(Number(event.target.dataset.at)); return; }
     const frame = mapPlot.getBoundingClientRect();
-    const unit = box.width / frame.width;
-    const t = nearest((event.clientX - frame.left) * unit, (event.clientY - frame.top) * unit, 6 * unit);
+    const unit = view.width / frame.width;
+    const t = nearest(view.x + (event.clientX - frame.left) * unit,
+      view.y + (event.clientY - frame.top) * unit, 6 * unit);
     if (t !== null) at(t);
   };
   mapPlot.addEventListener("pointermove", onMap);
   mapPlot.addEventListener("pointerdown", onMap);
+
+  // Zoom by the buttons, a double click, or the wheel with Ctrl; drag to move.
+  const scale = map.querySelector(".scale");
+  const marks = all(".mark", map).map((mark) => ({
+    mark, x: parseFloat(mark.style.left) / 100 * mapWidth, y: parseFloat(mark.style.top) / 100 * mapHeight,
+  }));
+  const look = (x, y, width) => {
+    const height = width / mapWidth * mapHeight;
+    view = { width, height, x: clamp(x, 0, mapWidth - width), y: clamp(y, 0, mapHeight - height) };
+    drawing.setAttribute("viewBox", `${view.x} ${view.y} ${width} ${height}`);
+    mapPlot.classList.toggle("zoomed", width < mapWidth);
+    for (const { mark, x: left, y: top } of marks) place(mark, left, top);
+    const rough = width / 60, power = 10 ** Math.floor(Math.log10(rough)); // m; 10 units each
+    const bar = power * [1, 2, 5, 10].find((factor) => factor * power >= rough * (1 - 1e-9));
+    scale.style.width = `${bar * 10 / width * 100}%`;
+    scale.textContent = bar >= 1000 ? `${bar / 1000} km` : `${+bar.toPrecision(3)} m`;
+    if (document.documentElement.dataset.time) show(Number(document.documentElement.dataset.time));
+  };
+  const zoom = (factor, x, y) => {
+    const width = clamp(view.width / factor, mapWidth / 256, mapWidth);
+    const share = width / view.width;
+    look(x - (x - view.x) * share, y - (y - view.y) * share, width);
+  };
+  const under = (event) => {
+    const frame = mapPlot.getBoundingClientRect(), unit = view.width / frame.width;
+    return [view.x + (event.clientX - frame.left) * unit, view.y + (event.clientY - frame.top) * unit];
+  };
+  for (const button of all("button[data-zoom]", map)) {
+    button.addEventListener("click", () => {
+      const dot = tracks.find(({ role }) => role === "c-ours").dot;
+      const at = dot && dot.style.display === "block" ? [dot.style.left, dot.style.top] : ["50%", "50%"];
+      const [x, y] = at.map((text) => parseFloat(text) / 100);
+      const inside = x >= 0 && x <= 1 && y >= 0 && y <= 1;
+      zoom(Number(button.dataset.zoom), view.x + (inside ? x : 0.5) * view.width,
+        view.y + (inside ? y : 0.5) * view.height);
+    });
+  }
+  mapPlot.addEventListener("dblclick", (event) => {
+    if (!event.target.dataset.zoom) zoom(2, ...under(event));
+  });
+  mapPlot.addEventListener("wheel", (event) => {
+    if (!event.ctrlKey) return;
+    event.preventDefault();
+    zoom(2 ** (-event.deltaY / 200), ...under(event));
+  }, { passive: false });
+  mapPlot.addEventListener("pointerdown", (event) => {
+    if (view.width < mapWidth && !event.target.dataset.zoom) dragged = under(event);
+  });
+  addEventListener("pointermove", (event) => {
+    if (!dragged) return;
+    const [x, y] = under(event);
+    look(view.x + dragged[0] - x, view.y + dragged[1] - y, view.width);
+  });
+  for (const kind of ["pointerup", "pointercancel"]) addEventListener(kind, () => { dragged = null; });
+
   for (const input of all("input[data-role]", map)) {
     const apply = () => {
       for (const { path, role, dot } of tracks) {

@@ -210,7 +210,8 @@ def _scale_and_north(axes: Axes, item: Map) -> None:
     west, south, east, north = item.box
     width, height = east - west, north - south
     bar = nice_step(width, 6)
-    x, y = west + 0.03 * width, south + 0.035 * height
+    x = west + 0.03 * width if item.scale_side == "left" else east - 0.03 * width - bar
+    y = south + 0.035 * height
     axes.plot([x, x + bar], [y, y], color="#1c2128", lw=1.8, solid_capstyle="butt")
     text = f"{bar / 1000.0:g} km" if bar >= 1000.0 else f"{bar:g} m"
     axes.text(x + 0.5 * bar, y + 0.012 * height, text, ha="center", va="bottom")

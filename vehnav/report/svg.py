@@ -180,7 +180,7 @@ def map_figure(item: Map) -> str:
         f'aria-label="Map of the tracks">'
         f'<svg viewBox="0 0 {width:.0f} {height:.0f}" preserveAspectRatio="none" '
         f'aria-hidden="true">{"".join(drawn)}</svg>{"".join(marks)}{dots}'
-        f"{_scale_bar(item)}{NORTH}</div>"
+        f"{_scale_bar(item)}{NORTH}{ZOOM}</div>"
         '<p class="readout" aria-live="off">Point at the map or at a plot: the cursor is the same '
         f"instant everywhere.</p>{_too_large(item)}</figure>"
     )
@@ -191,6 +191,12 @@ DOTTED: Final = ("ours", "gps")
 NORTH: Final = (
     '<span class="north" title="north is up"><svg viewBox="0 0 20 30" aria-hidden="true">'
     '<path d="M10 1L16 17L10 13L4 17Z"/></svg>N</span>'
+)
+
+
+ZOOM: Final = (
+    '<span class="zoom"><button type="button" data-zoom="2" aria-label="zoom in">+</button>'
+    '<button type="button" data-zoom="0.5" aria-label="zoom out">−</button></span>'
 )
 
 
@@ -310,7 +316,8 @@ def _scale_bar(item: Map) -> str:
     width = item.box[2] - item.box[0]
     step = nice_step(width, 6)
     text = f"{step / 1000.0:g} km" if step >= 1000.0 else f"{step:g} m"
-    return f'<span class="scale" style="width:{100.0 * step / width:.2f}%">{text}</span>'
+    style = f"width:{100.0 * step / width:.2f}%"
+    return f'<span class="scale {item.scale_side}" style="{style}">{text}</span>'
 
 
 def _map_legend(item: Map) -> str:
