@@ -27,7 +27,6 @@ from vehnav.rotation import (
     Vec3,
     add,
     cross,
-    dot,
     mat_t_vec,
     mat_vec,
     quaternion_from_c,
@@ -42,11 +41,13 @@ from vehnav.strapdown.body_step import (
 )
 from vehnav.strapdown.increments import Increments
 from vehnav.strapdown.inertial import (
+    carried,
+    clamped,
     earth_spin,
     j2_gravitation,
     local_frame,
     normal_gravitation,
-    turned_with_earth,
+    velocity_over_ground,
 )
 from vehnav.strapdown.quaternion import (
     Quat,
@@ -144,47 +145,12 @@ def eci_step(
 
 
 @kernel
-def carried(r: Vec3, v: Vec3, ground_new: Vec3, dt: float, earth: Ellipsoid) -> tuple[Vec3, Vec3]:
-    """Radius vector and velocity when the velocity over ground becomes ``ground_new``.
-
-    The vehicle turns with the Earth and moves over it by the mean of the two (trapezoid).
-    """
-    ground = subtract(v, earth_spin(r, earth))
-    back = turned_with_earth(ground_new, -dt, earth)
-    r_new = turned_with_earth(add(r, scale(0.5 * dt, add(ground, back))), dt, earth)
-    return r_new, add(ground_new, earth_spin(r_new, earth))
-
-
-@kernel
 def coasted(
     r: Vec3, v: Vec3, q: Quat, q_new: Quat, dt: float, earth: Ellipsoid
 ) -> tuple[Vec3, Vec3]:
     """Radius vector and velocity after a gap: the velocity over ground is held in body axes."""
     ground = subtract(v, earth_spin(r, earth))
     return carried(r, v, rotate(q_new, rotate_back(q, ground)), dt, earth)
-
-
-@kernel
-def velocity_over_ground(r: Vec3, v: Vec3, earth: Ellipsoid) -> Vec3:
-    """East, north, up velocity, m/s: C_ni (V - Omega x R)."""
-    return mat_vec(local_frame(r, earth)[0], subtract(v, earth_spin(r, earth)))
-
-
-@kernel
-def clamped(r: Vec3, v: Vec3, dt: float, height: float, earth: Ellipsoid) -> tuple[Vec3, Vec3]:
-    """Radius vector at ``height`` and velocity without its vertical part over ground.
-
-    What is taken out came in evenly over the step, while the vertical turned: so it is taken out
-    along the vertical of mid-step. Without that Coriolis would feel the half of it.
-    """
-    frame, _, h = local_frame(r, earth)
-    up = (frame[6], frame[7], frame[8])
-    ground = subtract(v, earth_spin(r, earth))
-    climb = dot(ground, up)
-    level = scale(1.0 / math.sqrt(dot(r, r)), subtract(ground, scale(climb, up)))
-    up_rate = add(earth_spin(up, earth), level)
-    up_then = subtract(up, scale(0.5 * dt, up_rate))
-    return add(r, scale(height - h, up)), subtract(v, scale(climb, up_then))
 
 
 @kernel
@@ -205,6 +171,43 @@ def levelled(
 
 
 # ---- the loop ----------------------------------------------------------------------------------
+
+
+@kernel
+def write_state(
+    k: int,
+    earth_turn: float,
+    r: Vec3,
+    v: Vec3,
+    q: Quat,
+    halted: bool,
+    clamp: bool,
+    height: float,
+    earth: Ellipsoid,
+    out_inertial: Array,
+    out_position: Array,
+    out_velocity: Array,
+    out_attitude: Array,
+) -> None:
+    """Row k of the outputs; ``earth_turn`` (rad) since the start is what longitude loses.
+
+    What is held is written as held, free of the rounding of V - Omega x R.
+    """
+    frame, lat, h = local_frame(r, earth)
+    v_n = mat_vec(frame, subtract(v, earth_spin(r, earth)))
+    if halted:
+        v_n = velocity_reset()
+    out_inertial[k, 0], out_inertial[k, 1], out_inertial[k, 2] = r
+    out_position[k, 0] = lat
+    out_position[k, 1] = math.atan2(r[1], r[0]) - earth_turn
+    out_position[k, 2] = height if clamp else h
+    out_velocity[k, 0], out_velocity[k, 1] = v_n[0], v_n[1]
+    out_velocity[k, 2] = 0.0 if clamp else v_n[2]
+    (
+        out_attitude[k, 0], out_attitude[k, 1], out_attitude[k, 2],
+        out_attitude[k, 3], out_attitude[k, 4], out_attitude[k, 5],
+        out_attitude[k, 6], out_attitude[k, 7], out_attitude[k, 8],
+    ) = dcm_of(frame, q)  # fmt: skip
 
 
 @entry_kernel
@@ -278,21 +281,10 @@ def integrate_eci(
                 out_v_before[stop, 0], out_v_before[stop, 1], out_v_before[stop, 2] = v_before
             out_tilt[stop, 0] += turn[0]
             out_tilt[stop, 1] += turn[1]
-        frame, lat, h = local_frame(r, earth)
-        v_n = mat_vec(frame, subtract(v, earth_spin(r, earth)))
-        if reset and stop >= 0:
-            v_n = velocity_reset()  # free of the rounding of V - Omega x R
-        out_inertial[k, 0], out_inertial[k, 1], out_inertial[k, 2] = r
-        out_position[k, 0] = lat
-        out_position[k, 1] = math.atan2(r[1], r[0]) - earth.omega_ie * (t[k] - t[0])
-        out_position[k, 2] = height if clamp else h
-        out_velocity[k, 0], out_velocity[k, 1] = v_n[0], v_n[1]
-        out_velocity[k, 2] = 0.0 if clamp else v_n[2]
-        (
-            out_attitude[k, 0], out_attitude[k, 1], out_attitude[k, 2],
-            out_attitude[k, 3], out_attitude[k, 4], out_attitude[k, 5],
-            out_attitude[k, 6], out_attitude[k, 7], out_attitude[k, 8],
-        ) = dcm_of(frame, q)  # fmt: skip
+        write_state(
+            k, earth.omega_ie * (t[k] - t[0]), r, v, q, reset and stop >= 0, clamp, height, earth,
+            out_inertial, out_position, out_velocity, out_attitude,
+        )  # fmt: skip
 
 
 # ---- the call from Python ----------------------------------------------------------------------

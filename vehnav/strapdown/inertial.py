@@ -11,7 +11,7 @@ from typing import Final
 
 from vehnav.earth import Ellipsoid, normal_gravity
 from vehnav.kernel import kernel
-from vehnav.rotation import Mat3, Vec3
+from vehnav.rotation import Mat3, Vec3, add, dot, mat_vec, scale, subtract
 
 MU: Final = 3.986004418e14
 """m3/s2: the Earth's gravitational constant, for the J2 field."""
@@ -82,3 +82,38 @@ def turned_with_earth(r: Vec3, dt: float, earth: Ellipsoid) -> Vec3:
     """Radius vector r after the Earth has turned by Omega dt under it."""
     s, c = math.sin(earth.omega_ie * dt), math.cos(earth.omega_ie * dt)
     return (c * r[0] - s * r[1], s * r[0] + c * r[1], r[2])
+
+
+@kernel
+def velocity_over_ground(r: Vec3, v: Vec3, earth: Ellipsoid) -> Vec3:
+    """East, north, up velocity, m/s: C_ni (V - Omega x R)."""
+    return mat_vec(local_frame(r, earth)[0], subtract(v, earth_spin(r, earth)))
+
+
+@kernel
+def carried(r: Vec3, v: Vec3, ground_new: Vec3, dt: float, earth: Ellipsoid) -> tuple[Vec3, Vec3]:
+    """Radius vector and velocity when the velocity over ground becomes ``ground_new``.
+
+    The vehicle turns with the Earth and moves over it by the mean of the two (trapezoid).
+    """
+    ground = subtract(v, earth_spin(r, earth))
+    back = turned_with_earth(ground_new, -dt, earth)
+    r_new = turned_with_earth(add(r, scale(0.5 * dt, add(ground, back))), dt, earth)
+    return r_new, add(ground_new, earth_spin(r_new, earth))
+
+
+@kernel
+def clamped(r: Vec3, v: Vec3, dt: float, height: float, earth: Ellipsoid) -> tuple[Vec3, Vec3]:
+    """Radius vector at ``height`` and velocity without its vertical part over ground.
+
+    What is taken out came in evenly over the step, while the vertical turned: so it is taken out
+    along the vertical of mid-step. Without that Coriolis would feel the half of it.
+    """
+    frame, _, h = local_frame(r, earth)
+    up = (frame[6], frame[7], frame[8])
+    ground = subtract(v, earth_spin(r, earth))
+    climb = dot(ground, up)
+    level = scale(1.0 / math.sqrt(dot(r, r)), subtract(ground, scale(climb, up)))
+    up_rate = add(earth_spin(up, earth), level)
+    up_then = subtract(up, scale(0.5 * dt, up_rate))
+    return add(r, scale(height - h, up)), subtract(v, scale(climb, up_then))
