@@ -1,7 +1,7 @@
 """From samples to increments: what the sensors measured over each step.
 
 A step runs from sample k to sample k+1. Rates are integrated by 4-point quadrature with the true,
-uneven steps (spec A 5.4): third order, against first order of a held sample and second order of
+uneven steps (spec A 5.4): fourth order, against first order of a held sample and second order of
 the trapezoid; one-sided at the ends and beside gaps. Over a gap, and where neighbouring steps are
 too uneven, the trapezoid is used.
 """
@@ -50,18 +50,19 @@ class Increments:
         """(n-1,) step lengths, s; negative when reversed."""
         return np.diff(self.t)
 
-    def corrected(self, gyro_bias: npt.ArrayLike, accel_scale: float = 1.0) -> Increments:
-        """With a gyro bias removed and the accelerometers scaled.
+    def corrected(self, gyro_bias: npt.ArrayLike, accel_bias: npt.ArrayLike) -> Increments:
+        """With the biases of the gyros and of the accelerometers removed.
 
         Parameters
         ----------
         gyro_bias : (3,) or (n-1, 3)
             rad/s, body axes; per step where it varies.
-        accel_scale : float
-            Factor on the specific force.
+        accel_bias : (3,) or (n-1, 3)
+            m/s2, the same.
         """
         dtheta = self.dtheta - np.asarray(gyro_bias, float) * self.dt[:, None]
-        return Increments(self.t, dtheta, self.dvel * accel_scale, self.coast)
+        dvel = self.dvel - np.asarray(accel_bias, float) * self.dt[:, None]
+        return Increments(self.t, dtheta, dvel, self.coast)
 
     def part(self, first: int, last: int) -> Increments:
         """The steps between instants ``first`` and ``last``, both included."""
