@@ -191,9 +191,11 @@ def seconds(function: Callable[[Path], object], path: Path) -> float:
 def peak_mb(path: Path) -> float:
     """Greatest memory of a process that reads the file, interpreter and libraries included."""
     code = (
-        "import sys, resource; from vehnav.logs.mcap import read_mcap; "
+        "import pathlib, re, sys, resource; from vehnav.logs.mcap import read_mcap; "
         "from vehnav.logs.log import ReadOptions; read_mcap(sys.argv[1], ReadOptions()); "
-        "print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)"
+        "status = pathlib.Path('/proc/self/status'); "
+        "print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss if not status.exists() else "
+        "re.search(r'VmHWM:\\s+(\\d+)', status.read_text())[1])"
     )
     out = subprocess.run(
         [sys.executable, "-c", code, str(path)], capture_output=True, text=True, check=True

@@ -76,8 +76,9 @@ class Delivery:
         count : bool
             Whether they count as seen (False where the index has counted them already).
         """
-        for channel_id in np.unique(heads["channel"]).tolist():
-            mine = np.flatnonzero(heads["channel"] == channel_id)
+        ids = heads["channel"]
+        for channel_id in np.flatnonzero(np.bincount(ids)).tolist():
+            mine = np.flatnonzero(ids == channel_id)
             topic = self.topic(channel_id)
             if topic is None:
                 self.unknown[channel_id] = self.unknown.get(channel_id, 0) + mine.size

@@ -137,24 +137,21 @@ class Scan:
         if not starts:
             return end if end <= self.source.size and end - at > MAX_RECORD else self.search(at)
         broken = not other.size and at + stop < self.source.size and not self.sound(at + stop)
+        self.deliver_loose(data, chunks.of_walk(data, starts, stop))
         if broken:  # the length of the last one may be what is wrong
-            return self.deliver_loose(data[:stop], at, starts[-1])
-        return self.deliver_loose(data[:stop], at, None)
+            return self.search(at + starts[-1] + rec.MESSAGE_HEAD.itemsize - 1)
+        return at + stop
 
     def sound(self, at: int) -> bool:
         """Whether a record begins here that ends inside the file."""
         return self.plausible(at) or self.source.read(at, 8) == rec.MAGIC
 
-    def deliver_loose(self, data: npt.NDArray[np.uint8], at: int, suspect: int | None) -> int:
-        """Hand out the messages of a window; where to go on."""
-        found = chunks.find_messages(data, known=self.delivery.known, indexes=[], whole=False)
+    def deliver_loose(self, data: npt.NDArray[np.uint8], found: chunks.Found) -> None:
+        """Hand out the messages of a window."""
         declare(self.delivery, data, found.others)
-        state: State = "recovered" if self.lost_way or found.breaks else "sound"
+        state: State = "recovered" if self.lost_way else "sound"
         self.delivery.take(data, found.at, found.heads, state, count=True)
         self.lost_way = False
-        if suspect is None:
-            return at + int(data.size)
-        return self.search(at + suspect + rec.MESSAGE_HEAD.itemsize - 1)
 
     def search(self, at: int) -> int:
         """The next chunk or message behind ``at``; the lost part is noted."""

@@ -73,16 +73,18 @@ class RosDecoder:
                     f"CDR encapsulation 0x{int(value):04x} is not supported{_hint(value)}"
                 )
                 continue
-            parts.append(self._decode_kind(batch, has_head[kind == value], 4, *known))
+            rows = has_head if same else has_head[kind == value]
+            parts.append(self._decode_kind(batch, rows, 4, *known))
         return _merge(parts)
 
     def _decode_kind(
         self, batch: Batch, row: Ints, skip: int, order: str, max_align: int
     ) -> Decoded:
+        every = row.size == batch.start.size
         cursor = Cursor(
             batch.data,
-            batch.start[row] + skip,
-            batch.size[row] - skip,
+            (batch.start if every else batch.start[row]) + skip,
+            (batch.size if every else batch.size[row]) - skip,
             order=order,
             max_align=max_align,
         )
