@@ -134,7 +134,7 @@ def test_the_map_is_true_to_scale(page: str, city: Run) -> None:
     assert np.hypot(east, north) == pytest.approx(distance, abs=0.25)
     assert deg(np.arctan2(east, -north)) == pytest.approx(azimuth, abs=0.05)
     width = float(re.search(r'viewBox="0 0 (\d+) ', part)[1]) / 10.0  # type: ignore[index]
-    bar = re.search(r'class="scale \w+" style="width:([\d.]+)%">(\d+) m<', part)
+    bar = re.search(r'class="scale [\w-]+" style="width:([\d.]+)%">(\d+) m<', part)
     assert bar is not None
     assert float(bar[1]) / 100.0 * width == pytest.approx(float(bar[2]), rel=1e-3)
 
@@ -199,6 +199,9 @@ def test_a_local_track_without_gps_has_a_page(city: Run) -> None:
     assert "in a local frame: not compared with GPS" in found.text
     assert "Expected horizontal error" in found.text
     assert "Methods compared" not in found.text
+    assert "north is not known" in found.text
+    assert not found.named("span", title="north is up")
+    assert not [e for e in found.named("path") if "c-gps" in e.get("class", "") and "data-t" in e]
 
 
 def test_a_log_without_gps_or_findings_has_a_page(city: Run) -> None:
@@ -252,3 +255,22 @@ def test_stops_at_one_place_share_a_mark() -> None:
 def test_escaping_is_complete() -> None:
     assert esc("a\x00b\u2028c") == "a\\u0000b\\u2028c"
     assert esc("Größe 漢字 m²") == "Größe 漢字 m²"
+
+
+def test_every_flag_of_the_command_is_an_option_of_run() -> None:
+    from vehnav.cli.run import run as command
+
+    known = {flag for param in command.params for flag in (*param.opts, *param.secondary_opts)}
+    other: dict[str, Any] = {
+        "axes": "FRD", "accel_axes": "BRD", "mount": (1.0, 2.0, 3.0), "start": 1.0, "end": 9.0,
+        "max_gap": 0.2, "split": True, "method": "free", "as_published": True,
+        "levelling": False, "reset": False, "causal": True, "vertical": "free",
+        "ellipsoid": "krasovsky", "levelling_rate": 0.5, "stop_threshold": 0.4,
+        "stop_statistic": "rms", "stop_window": 1.0, "stop_dwell": 3.0, "gps": "none",
+        "gps_start_seconds": 30.0, "start_position": (1.0, 2.0, 3.0), "start_heading": 4.0,
+        "start_attitude": (1.0, 2.0, 3.0),
+    }  # fmt: skip
+    words = command_line("a.mcap", Config(**other)).split()
+    flags = {word for word in words if word.startswith("--")}
+    assert flags <= known
+    assert len(flags) == len(other)

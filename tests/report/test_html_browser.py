@@ -175,6 +175,9 @@ def test_zoom_keeps_scale_marks_and_cursor_in_place(
     width = float(browser.run(size))
     assert width == pytest.approx((east - west) / 8.0, rel=1e-3)
     text = str(browser.run("document.querySelector('.scale').textContent"))
+    plot, scale = browser.box(".map .plot"), browser.box(".scale")
+    assert scale["y"] > plot["y"] + 0.8 * plot["height"]
+    assert scale["y"] + scale["height"] < plot["y"] + plot["height"]
     bar = "parseFloat(document.querySelector('.scale').style.width) / 100"
     assert text.endswith(" m")
     assert float(browser.run(bar)) * width == pytest.approx(float(text[:-2]), rel=1e-3)
@@ -185,3 +188,16 @@ def test_zoom_keeps_scale_marks_and_cursor_in_place(
         browser.run("document.querySelector('[data-zoom=\"0.5\"]').click()")
     assert float(browser.run(size)) == pytest.approx(east - west, abs=0.1)
     assert browser.complaints == []
+
+
+@pytest.mark.parametrize("width", [390, 1366])
+def test_the_page_does_not_jump_when_values_appear(
+    browser: Browser, page: Path, width: int
+) -> None:
+    browser.open(page, width=width)
+    tops = "[...document.querySelectorAll('figure')].map(f => f.getBoundingClientRect().top)"
+    box = browser.box("#speed .plot")
+    before = browser.run(tops)
+    browser.point(box["x"] + 0.6 * box["width"], box["y"] + 20.0)
+    assert browser.run("document.querySelector('#speed output').textContent") != ""
+    assert browser.run(tops) == before

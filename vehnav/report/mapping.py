@@ -88,6 +88,7 @@ class Map:
     used: Track | None
     miss: tuple[tuple[float, float], tuple[float, float]] | None
     local: bool
+    north_known: bool
     scale_side: str
 
 
@@ -116,6 +117,7 @@ def map_of(run: Run) -> Map:
         used=used,
         miss=_miss(run, origin),
         local=run.alignment.local,
+        north_known=run.alignment.heading_from != "none",
         scale_side=_free_side(np.concatenate(seen), box),
     )
 

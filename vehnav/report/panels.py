@@ -175,7 +175,8 @@ def velocity_panel(run: Run, axis: int) -> Panel:
     """A velocity against GPS with and without the procedures: paper 002's figure 1 is east."""
     track = run.trajectory
     curves = []
-    if run.log.gnss is not None:
+    north_known = run.alignment.heading_from != "none"
+    if run.log.gnss is not None and north_known:
         within = inside(run, run.log.gnss)
         t = log_seconds(run, run.log.gnss.t_ns[within])
         curves.append(curve("GPS", "gps", t, gps_velocity(run.log.gnss)[within, axis]))
@@ -185,9 +186,12 @@ def velocity_panel(run: Run, axis: int) -> Panel:
     curves.append(curve(own_name(run), "ours", log_seconds(run, track.t_ns), track.v_n[:, axis]))
     y_range = _readable_range([c for c in curves if c.role in ("gps", "ours")])
     name = ("East", "North")[axis]
+    note = off_picture(curves, y_range, "m/s", "s")
+    if not north_known:
+        note = "north is not known: the first heading stands for it; " + note
     return Panel(
         f"{name.lower()}-velocity", f"{name} velocity", "m/s", "s", time_range(run), y_range,
-        tuple(curves), (), spans(run), off_picture(curves, y_range, "m/s", "s"),
+        tuple(curves), (), spans(run), note.rstrip("; "),
     )  # fmt: skip
 
 
@@ -226,7 +230,7 @@ def heading_panel(run: Run) -> Panel:
     own -= 360.0 * np.floor(own[0] / 360.0)
     curves = []
     gnss = run.log.gnss
-    if gnss is not None and not run.alignment.local:
+    if gnss is not None and run.alignment.heading_from != "none":
         fast = inside(run, gnss) & (np.hypot(*gps_velocity(gnss).T) > COURSE_FROM)
         if fast.any():
             at = log_seconds(run, gnss.t_ns[fast])

@@ -215,7 +215,7 @@ def _scale_and_north(axes: Axes, item: Map) -> None:
     axes.plot([x, x + bar], [y, y], color="#1c2128", lw=1.8, solid_capstyle="butt")
     text = f"{bar / 1000.0:g} km" if bar >= 1000.0 else f"{bar:g} m"
     axes.text(x + 0.5 * bar, y + 0.012 * height, text, ha="center", va="bottom")
-    if item.local:
+    if not item.north_known:
         return
     at = (east - 0.05 * width, north - 0.03 * height)
     axes.annotate("N", at, (at[0], at[1] - 0.11 * height), ha="center", va="bottom",

@@ -68,7 +68,8 @@ def gps_sentence(run: Run) -> str:
     if run.log.gnss is None:
         return "The log has no GPS."
     if not use.used_for or use.until_ns is None:
-        return "GPS was not used for the solution; it only judges."
+        judges = run.errors is not None or run.errors_before is not None
+        return "GPS was not used for the solution" + ("; it only judges." if judges else ".")
     until = (use.until_ns - run.start_ns) * 1e-9
     window = ""
     if use.window_s is not None and use.window_path_m is not None:
@@ -206,13 +207,13 @@ def start_details(run: Run, document: Document) -> str:
         ("Gyro bias", f"{bias} °/h (right, forward, up), the Earth's rate taken out"),
     ]
     if a["rest_force_m_s2"] is not None:
-        excess = a["rest_force_m_s2"] - a["gravity_m_s2"]
+        bias, scale = a["accel_bias_along_gravity_m_s2"], a["accel_scale_error_instead"]
         pairs.append(
             (
                 "Force at rest",
-                f"{a['rest_force_m_s2']:.4f} m/s² against gravity {a['gravity_m_s2']:.4f}: read as "
-                f"a scale of {a['accel_scale']:.5f}; as a bias it would be "
-                f"{number(excess, 0.001)} m/s²",
+                f"{a['rest_force_m_s2']:.4f} m/s² against gravity {a['gravity_m_s2']:.4f}: "
+                f"{number(bias, 0.001)} m/s² taken out as a bias along it; read as a scale error "
+                f"it would be {number(100.0 * scale, 0.01)} %",
             )
         )
     pairs.append(("GPS", esc(gps_sentence(run))))

@@ -162,8 +162,8 @@ def _legend(item: Panel, explained: bool) -> str:
 
 def map_figure(item: Map) -> str:
     """The map: tracks, stops, ellipses, scale bar and north."""
-    west, south, east, north = item.box
-    width, height = 10.0 * (east - west), 10.0 * (north - south)
+    west, south, east, top = item.box
+    width, height = 10.0 * (east - west), 10.0 * (top - south)
     drawn = [_map_grid(item)]
     drawn += [_ellipse(item, e) for e in item.ellipses]
     drawn += [_line(item, item.used, "used")] if item.used else []
@@ -172,6 +172,7 @@ def map_figure(item: Map) -> str:
         ends = np.array(item.miss)
         drawn.append(f'<path class="miss" d="{points(*_on_map(item, ends))}"/>')
     marks = _marks(item)
+    north = NORTH if item.north_known else ""
     dots = "".join(f'<i class="dot c-{t.role}"></i>' for t in item.tracks if t.role in DOTTED)
     return (
         f'<figure class="map" id="map"><figcaption><h3>Map <small>{_frame_text(item)}</small></h3>'
@@ -180,7 +181,7 @@ def map_figure(item: Map) -> str:
         f'aria-label="Map of the tracks">'
         f'<svg viewBox="0 0 {width:.0f} {height:.0f}" preserveAspectRatio="none" '
         f'aria-hidden="true">{"".join(drawn)}</svg>{"".join(marks)}{dots}'
-        f"{_scale_bar(item)}{NORTH}{ZOOM}</div>"
+        f"{_scale_bar(item)}{north}{ZOOM}</div>"
         '<p class="readout" aria-live="off">Point at the map or at a plot: the cursor is the same '
         f"instant everywhere.</p>{_too_large(item)}</figure>"
     )
@@ -208,7 +209,9 @@ def _too_large(item: Map) -> str:
 
 
 def _frame_text(item: Map) -> str:
-    return "local frame: north and place are not known" if item.local else "grid in metres"
+    if not item.local:
+        return "grid in metres"
+    return "place not known" if item.north_known else "north not known: up is the first heading"
 
 
 def _on_map(item: Map, place: Array) -> tuple[Array, Array]:
@@ -317,7 +320,7 @@ def _scale_bar(item: Map) -> str:
     step = nice_step(width, 6)
     text = f"{step / 1000.0:g} km" if step >= 1000.0 else f"{step:g} m"
     style = f"width:{100.0 * step / width:.2f}%"
-    return f'<span class="scale {item.scale_side}" style="{style}">{text}</span>'
+    return f'<span class="scale at-{item.scale_side}" style="{style}">{text}</span>'
 
 
 def _map_legend(item: Map) -> str:
