@@ -344,7 +344,7 @@ def test_circle_with_exact_increments():
 def test_stops_act_as_in_enu():
     """A drive with tilt, bias and two stops: levelling, reset and their reports agree."""
     truth = exact(car(), np.arange(0.0, 60.0, 0.01))
-    inc = truth.increments().corrected([1e-5, -2e-5, 3e-5])
+    inc = truth.increments().corrected([1e-5, -2e-5, 3e-5], np.zeros(3))
     n = truth.t.size
     stop_id = np.full(n, -1, dtype=np.int64)
     stop_id[:300], stop_id[2000:2600] = 0, 1
@@ -466,7 +466,7 @@ def test_compiled_equals_plain_python_bit_for_bit():
 def test_tilt_of_a_bias_in_the_log_units():
     """A guard of signs through the whole ECI loop: east gyro bias of 1 deg/h drives south."""
     truth = exact(static(lat_deg=47.2), np.arange(0.0, 300.05, 0.1))
-    inc = truth.increments().corrected([-DEG / 3600.0, 0.0, 0.0])
+    inc = truth.increments().corrected([-DEG / 3600.0, 0.0, 0.0], np.zeros(3))
     solution = mechanize_eci(inc, position=tuple(truth.position[0]), c_nb=truth.c_nb[0])
     north = (solution.position[-1, 0] - truth.position[-1, 0]) * 6_370_000.0
     assert north == pytest.approx(-212.5, rel=0.01)

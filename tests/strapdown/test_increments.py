@@ -122,16 +122,18 @@ def test_logged_increments_drop_the_first_row_only():
     np.testing.assert_array_equal(inc.dtheta, truth.dtheta)
 
 
-def test_correction_removes_bias_and_scales_the_accelerometer():
+def test_correction_removes_the_biases():
     truth = exact(car(), np.array([0.0, 0.01, 0.03, 0.04]))
     inc = truth.increments()
-    bias = np.array([1e-3, -2e-3, 3e-3])
-    biased = Increments(inc.t, inc.dtheta + bias * inc.dt[:, None], inc.dvel / 1.25, inc.coast)
-    back = biased.corrected(bias, 1.25)
+    gyro, accel = np.array([1e-3, -2e-3, 3e-3]), np.array([0.02, 0.03, -0.01])
+    dt = inc.dt[:, None]
+    biased = Increments(inc.t, inc.dtheta + gyro * dt, inc.dvel + accel * dt, inc.coast)
+    back = biased.corrected(gyro, accel)
     np.testing.assert_allclose(back.dtheta, inc.dtheta, atol=1e-17)
-    np.testing.assert_allclose(back.dvel, inc.dvel, rtol=1e-15)
-    per_step = biased.corrected(np.tile(bias, (3, 1)), 1.25)
+    np.testing.assert_allclose(back.dvel, inc.dvel, atol=1e-16)
+    per_step = biased.corrected(np.tile(gyro, (3, 1)), np.tile(accel, (3, 1)))
     np.testing.assert_array_equal(per_step.dtheta, back.dtheta)
+    np.testing.assert_array_equal(per_step.dvel, back.dvel)
 
 
 def test_parts_and_reversal_keep_steps_with_their_instants():
