@@ -34,7 +34,7 @@ def test_27_levelling_ends_before_departure(late, least, most):
     increments = increments_from_rates(t, gyro, accel, max_gap=0.5)
     drive = Drive(t, gyro, accel, increments, [stop], WGS84, levelling_rate=1.0)
     place = float(truth.lat[0]), float(truth.lon[0]), float(truth.height[0])
-    start = Start(place, truth.c_nb[0], np.zeros(3), 1.0)
+    start = Start(place, truth.c_nb[0], np.zeros(3), np.zeros(3))
     solution = dead_reckon(drive, start, levelling=True, reset=False)
     later = np.searchsorted(t, t[last] + 60.0)
     east_north = position_difference(
