@@ -207,13 +207,14 @@ def start_details(run: Run, document: Document) -> str:
         ("Gyro bias", f"{bias} °/h (right, forward, up), the Earth's rate taken out"),
     ]
     if a["rest_force_m_s2"] is not None:
-        bias, scale = a["accel_bias_along_gravity_m_s2"], a["accel_scale_error_instead"]
+        excess = a["rest_force_m_s2"] - a["gravity_m_s2"]
+        share = 100.0 * excess / a["gravity_m_s2"]
         pairs.append(
             (
                 "Force at rest",
-                f"{a['rest_force_m_s2']:.4f} m/s² against gravity {a['gravity_m_s2']:.4f}: "
-                f"{number(bias, 0.001)} m/s² taken out as a bias along it; read as a scale error "
-                f"it would be {number(100.0 * scale, 0.01)} %",
+                f"{a['rest_force_m_s2']:.4f} m/s² against gravity {a['gravity_m_s2']:.4f}: taken "
+                f"out as a bias of {number(excess, 0.001)} m/s² along gravity; as a scale error it "
+                f"would be {number(share, 0.01)} %",
             )
         )
     pairs.append(("GPS", esc(gps_sentence(run))))
