@@ -31,6 +31,7 @@ def straight_log(
     seconds: float = 160.0,
     gps: bool = True,
     axes: str = "RFU",
+    seed: int = 1,
 ) -> Log:
     """A level drive due north with three stops; the Earth rate and gravity are in the samples.
 
@@ -38,7 +39,7 @@ def straight_log(
     straight drive cannot be told from rest. ``noise`` scales 0.05 deg/s and 0.02 m/s2 a sample. The transport rate (0.5 deg/h at 15 m/s)
     is left out of the gyro: 0.1 m here.
     """
-    rng = np.random.default_rng(1)
+    rng = np.random.default_rng(seed)
     t = np.arange(0.0, seconds, 1.0 / rate)
     v, a = speed_profile(t)
     lat = ORIGIN[0]

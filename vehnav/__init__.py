@@ -38,6 +38,73 @@ paper                          code
 
 from __future__ import annotations
 
+import importlib
+from typing import TYPE_CHECKING, Any
+
 from vehnav._version import __version__
 
-__all__ = ["__version__"]
+if TYPE_CHECKING:
+    from vehnav.config import Config
+    from vehnav.errors import ConfigError, Finding, FormatError, LogError, VehnavError
+    from vehnav.evaluation import Errors, compare
+    from vehnav.export.formats import read_trajectory, write_trajectory
+    from vehnav.library import read_log
+    from vehnav.logs.log import Gnss, Imu, Log, ReadOptions, Speed
+    from vehnav.pipeline import Run, run
+    from vehnav.trajectory import Trajectory
+
+_PUBLIC = {
+    "Config": "vehnav.config",
+    "ConfigError": "vehnav.errors",
+    "Errors": "vehnav.evaluation",
+    "Finding": "vehnav.errors",
+    "FormatError": "vehnav.errors",
+    "Gnss": "vehnav.logs.log",
+    "Imu": "vehnav.logs.log",
+    "Log": "vehnav.logs.log",
+    "LogError": "vehnav.errors",
+    "ReadOptions": "vehnav.logs.log",
+    "Run": "vehnav.pipeline",
+    "Speed": "vehnav.logs.log",
+    "Trajectory": "vehnav.trajectory",
+    "VehnavError": "vehnav.errors",
+    "compare": "vehnav.evaluation",
+    "read_log": "vehnav.library",
+    "read_trajectory": "vehnav.export.formats",
+    "run": "vehnav.pipeline",
+    "write_trajectory": "vehnav.export.formats",
+}
+"""Public name -> where it lives; imported when it is first used, so that the help stays light."""
+
+__all__ = [
+    "Config",
+    "ConfigError",
+    "Errors",
+    "Finding",
+    "FormatError",
+    "Gnss",
+    "Imu",
+    "Log",
+    "LogError",
+    "ReadOptions",
+    "Run",
+    "Speed",
+    "Trajectory",
+    "VehnavError",
+    "__version__",
+    "compare",
+    "read_log",
+    "read_trajectory",
+    "run",
+    "write_trajectory",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _PUBLIC:
+        raise AttributeError(f"module 'vehnav' has no attribute {name!r}")
+    return getattr(importlib.import_module(_PUBLIC[name]), name)
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

@@ -24,8 +24,6 @@ from vehnav.strapdown.increments import Increments
 
 Array = npt.NDArray[np.float64]
 
-SETTLE = 1.0
-"""s after the start of a stop until levelling begins: suspension rocking decays (spec A 4.2)."""
 GUARD = 0.3
 """s before the end of a stop at which levelling ends: 0.5 s of levelling under way cost 38 m a
 minute later (spec A 4.3)."""
@@ -87,8 +85,8 @@ class Start:
     c_nb : (3, 3)
     gyro_bias : (3,)
         rad/s, body axes.
-    accel_scale : float
-        Factor on the specific force.
+    accel_bias : (3,)
+        m/s2, body axes, along gravity at the first stop.
     v_n : (east, north, up)
         m/s, zero at a stop.
     """
@@ -96,7 +94,7 @@ class Start:
     position: tuple[float, float, float]
     c_nb: Array
     gyro_bias: Array
-    accel_scale: float
+    accel_bias: Array
     v_n: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     def turned(self, drive: Drive, heading: float) -> Start:
@@ -166,7 +164,7 @@ class Outcome:
     sigma_heading : (m,) or None
         rad
     accel_bias : (3,) or None
-        m/s2, body, beyond the scale; where the legs show it.
+        m/s2, body, beyond the one of the start; where the legs show it.
     """
 
     first: int
@@ -181,7 +179,7 @@ class Outcome:
 
 def rest_of(drive: Drive, stop: Stop) -> Rest:
     """Means over the part of a stop where levelling may work."""
-    inside = (drive.t >= stop.start + SETTLE) & (drive.t <= stop.end - GUARD)
+    inside = (drive.t >= stop.settled) & (drive.t <= stop.end - GUARD)
     where = np.flatnonzero(inside)
     if where.size < 2:
         return mean_over_rest(drive.omega, drive.f, stop.first, stop.last)
@@ -189,12 +187,12 @@ def rest_of(drive: Drive, stop: Stop) -> Rest:
 
 
 def levelling_gain(t: Array, stops: list[Stop], rate: float | None) -> Array:
-    """(n-1,) gain of procedure 1 over each step, 1/s: from SETTLE after the start to GUARD
-    before the end of every stop; ``rate``, or 1/(time since then + 0.5 s).
+    """(n-1,) gain of procedure 1 over each step, 1/s: from when every stop is settled to GUARD
+    before its end; ``rate``, or 1/(time since then + 0.5 s).
     """
     gain = np.zeros(t.size - 1)
     for stop in stops:
-        begin = stop.start + SETTLE
+        begin = stop.settled
         steps = np.flatnonzero((t[:-1] >= begin) & (t[1:] <= stop.end - GUARD))
         gain[steps] = rate if rate is not None else 1.0 / (t[steps] - begin + MEAN_OFFSET)
     return gain
@@ -219,14 +217,12 @@ def dead_reckon(
     """Integrate forward from the start with the procedures that are on.
 
     ``bias`` (n-1, 3) rad/s per step of the whole drive, else the one of the start; ``accel_bias``
-    (3,) m/s2, taken out after the scale.
+    (3,) m/s2, beyond the one of the start.
     """
     last = drive.t.size - 1
     per_step = np.broadcast_to(start.gyro_bias if bias is None else bias, (last, 3))
-    increments = drive.increments.corrected(per_step, start.accel_scale)
-    if accel_bias is not None:
-        dvel = increments.dvel - accel_bias * increments.dt[:, None]
-        increments = replace(increments, dvel=dvel)
+    extra = np.zeros(3) if accel_bias is None else accel_bias
+    increments = drive.increments.corrected(per_step, start.accel_bias + extra)
     control = stop_control(drive, levelling=levelling, reset=reset)
     return MECHANIZATIONS[drive.frame](
         increments.part(drive.first, last),
@@ -257,9 +253,9 @@ def bias_per_step(drive: Drive, seen: Array, noise: LegNoise, *, smooth: bool) -
 
     Offline it is interpolated between the stops; causally it is held until the next one ends.
     """
-    duration = np.array([stop.duration for stop in drive.stops])
+    duration = np.array([stop.end - GUARD - stop.settled for stop in drive.stops])
     middle = np.array([0.5 * (stop.start + stop.end) for stop in drive.stops])
-    variance = noise.gyro_white**2 / np.maximum(duration - SETTLE - GUARD, 1.0)
+    variance = noise.gyro_white**2 / np.maximum(duration, 1.0)
     track, _ = track_random_walk(middle, seen, variance, noise.gyro_bias_walk, smooth=smooth)
     at = 0.5 * (drive.t[1:] + drive.t[:-1])
     if smooth:

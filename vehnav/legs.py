@@ -175,7 +175,7 @@ def fit_legs(
         weighted = part.h_accel.T @ part.inverse
         information = information + weighted @ part.h_accel
         score = score + weighted @ (z - part.h_gyro @ mean)
-    covariance = np.linalg.inv(information)
+    covariance: Array = np.asarray(np.linalg.inv(information), dtype=np.float64)
     accel_bias: Array = np.asarray(covariance @ score, dtype=np.float64)
     errors = [
         part.errors(z, mean, accel_bias, covariance)

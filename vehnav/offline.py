@@ -289,10 +289,8 @@ def with_part_before(
     k0 = drive.first
     if k0 == 0 or not drive.stops:
         return outcome
-    increments = drive.increments.corrected(bias, start.accel_scale)
-    if outcome.accel_bias is not None:
-        dvel = increments.dvel - outcome.accel_bias * increments.dt[:, None]
-        increments = replace(increments, dvel=dvel)
+    extra = np.zeros(3) if outcome.accel_bias is None else outcome.accel_bias
+    increments = drive.increments.corrected(bias, start.accel_bias + extra)
     back = MECHANIZATIONS[drive.frame](
         increments.part(0, k0).reversed(),
         position=start.position,

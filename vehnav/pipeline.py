@@ -355,7 +355,7 @@ def _judge_all(
     judged: dict[str, Errors] = {}
     since = None if gps.until_ns is None else gps.until_ns + 1
     try:
-        judged[""] = compare(trajectory, gnss, judge_from_ns=since)
+        judged[""] = compare(trajectory, gnss, judge_from_ns=since, estimate_offset=True)
         for name, track in variants.items():
             judged[name] = compare(track, gnss, judge_from_ns=since)
     except VehnavError:

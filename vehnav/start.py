@@ -1,7 +1,7 @@
 """The start of the drive: where it is, how it is turned, and what each of these came from.
 
-Level, gyro bias and the scale of the specific force come from the first stop; position and heading
-from GPS (:mod:`vehnav.gps_start`) or from the user; what nobody gives stays local.
+Level, gyro bias and the accelerometer error along gravity come from the first stop; position and
+heading from GPS (:mod:`vehnav.gps_start`) or from the user; what nobody gives stays local.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from vehnav.alignment import accel_scale
+from vehnav.alignment import bias_along_gravity
 from vehnav.classic import Corrections, Drive, Outcome, Start, rest_of
 from vehnav.earth import normal_gravity
 from vehnav.errors import Finding
@@ -53,9 +53,8 @@ class Alignment:
     rest_force : float or None
         m/s2, size of the specific force at the first stop.
     gravity : float
-        m/s2, normal gravity there.
-    accel_scale : float
-        What the specific force was multiplied with: gravity / rest_force.
+        m/s2, normal gravity there. The difference is taken out as a bias along gravity; read as a
+        scale error it would be rest_force / gravity - 1.
     """
 
     time_ns: int
@@ -69,7 +68,6 @@ class Alignment:
     gyro_bias: Array
     rest_force: float | None
     gravity: float
-    accel_scale: float
 
     @property
     def local(self) -> bool:
@@ -171,13 +169,14 @@ def _given_heading(given: Given) -> tuple[float | None, str]:
 def _level_start(
     drive: Drive, position: tuple[float, float, float], given: Given
 ) -> tuple[Start, float | None]:
-    """Level, gyro bias and scale of the specific force at the first stop, heading 0."""
+    """Level, gyro bias and accelerometer error along gravity at the first stop, heading 0."""
     if not drive.stops:
         heading, pitch, roll = given.attitude or (0.0, 0.0, 0.0)
-        return Start(position, c_nb_from_angles(heading, pitch, roll), np.zeros(3), 1.0), None
+        zero = np.zeros(3)
+        return Start(position, c_nb_from_angles(heading, pitch, roll), zero, zero), None
     rest = rest_of(drive, drive.stops[0])
-    factor = accel_scale(rest, position[0], position[2], earth=drive.earth)
-    start = Start(position, rest.c_nb(0.0), np.zeros(3), factor)
+    bias = bias_along_gravity(rest, position[0], position[2], earth=drive.earth)
+    start = Start(position, rest.c_nb(0.0), np.zeros(3), bias)
     return start.turned(drive, 0.0), float(np.linalg.norm(rest.f))
 
 
@@ -243,7 +242,6 @@ def _alignment(
         gyro_bias=start.gyro_bias,
         rest_force=rest_force,
         gravity=float(normal_gravity(start.position[0], start.position[2], drive.earth)),
-        accel_scale=start.accel_scale,
     )
 
 

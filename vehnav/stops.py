@@ -14,7 +14,7 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
-from vehnav.rest import running_deviation, running_mean, runs, samples_in_window
+from vehnav.rest import TimeIntegral, running_deviation, running_mean, runs, samples_in_window
 from vehnav.units import DEG
 
 Array = npt.NDArray[np.float64]
@@ -37,6 +37,12 @@ TRIM_FORCE = 0.06
 """m/s2 by which it may differ: above the noise of the mean, below any departure."""
 TRIM_SIGMAS = 4.0
 """or that many of its own deviations in the middle of the stop, where vibration is strong."""
+ARRIVAL = 2.5
+"""s within which the last of the speed goes, at the start of a stop."""
+ARRIVAL_SPEED = 0.2
+"""m/s that may be left on the first instant of a stop."""
+SETTLE = 1.0
+"""s after the start until the level may be taken: suspension rocking decays (spec A 4.2)."""
 MIN_SHARE = 0.6
 """of the expected samples that a window must hold: a gap is not quiet."""
 MARGIN_WARNING = 0.8
@@ -99,6 +105,8 @@ class Stop:
         Indices of its first and last sample.
     start, end : float
         s since the first sample of the log.
+    settled : float
+        s, from when on the specific force is that of rest: levelling begins here.
     rate, force : float
         Medians of the statistics inside, rad/s and m/s2.
     margin : float
@@ -109,6 +117,7 @@ class Stop:
     last: int
     start: float
     end: float
+    settled: float
     rate: float
     force: float
     margin: float
@@ -178,28 +187,58 @@ def stops_from_statistics(
         last = int(np.searchsorted(t, t[last] + shift, side="right")) - 1
         if stops and first <= stops[-1].last:
             first = stops[-1].last + 1
-        last = _last_still(t, f, first, last)
+        first, last = _first_still(t, f, first, last), _last_still(t, f, first, last)
         if last > first:
-            stops.append(Stop(first, last, float(t[first]), float(t[last]), *figures))
+            settled = _settled(t, f, first, last)
+            stops.append(Stop(first, last, float(t[first]), float(t[last]), settled, *figures))
     return stops
+
+
+def _first_still(t: Array, f: Array, first: int, last: int) -> int:
+    """Where a stop really begins: a gentle arrival is quieter than the threshold.
+
+    The first instant on which the accelerometers show less than 0.2 m/s yet to vanish. Rocking on
+    the springs has no net speed and is standing.
+    """
+    if last - first < 8:
+        return first
+    half = (first + last) // 2
+    rest = f[half : last + 1].mean(axis=0)
+    early = t[first : half + 1]
+    end = np.minimum(early + ARRIVAL, t[half])
+    mean = TimeIntegral(early, f[first : half + 1] - rest).mean(early, end)
+    left = np.linalg.norm(mean * (end - early)[:, None], axis=1)
+    return first + int(np.argmax(left < ARRIVAL_SPEED))
 
 
 def _last_still(t: Array, f: Array, first: int, last: int) -> int:
     """Where a stop really ends: a gentle start is quieter than the threshold.
 
     The last instant whose 0.5 s mean of the specific force is that of the middle half (spec A 4.2
-    rule 4). The start is not trimmed: there the vehicle settles on its springs, which is standing.
+    rule 4).
     """
+    near = _near_rest(t, f, first, last)
+    return first + int(near[-1]) if near.size else last
+
+
+def _settled(t: Array, f: Array, first: int, last: int) -> float:
+    """From when on the level may be taken, s: after SETTLE, and once the force is that of rest."""
+    near = _near_rest(t, f, first, last)
+    steady = float(t[first + int(near[0])]) if near.size else float(t[first])
+    return min(max(float(t[first]) + SETTLE, steady), 0.5 * float(t[first] + t[last]))
+
+
+def _near_rest(t: Array, f: Array, first: int, last: int) -> IntArray:
+    """Instants, counted from ``first``, whose mean specific force is that of the middle half."""
     if last - first < 8:
-        return last
+        return np.arange(last + 1 - first)
     inside = slice(first, last + 1)
     mean = running_mean(t[inside], f[inside], TRIM_MEAN)
     quarter = (last + 1 - first) // 4
     middle = slice(quarter, last + 1 - first - quarter)
     away = np.linalg.norm(mean - np.median(mean[middle], axis=0), axis=1)
     noise = float(np.sqrt(np.mean(away[middle] ** 2)))
-    near = np.flatnonzero(away <= max(TRIM_FORCE, TRIM_SIGMAS * noise))
-    return first + int(near[-1]) if near.size else last
+    return np.flatnonzero(away <= max(TRIM_FORCE, TRIM_SIGMAS * noise))
 
 
 def stopped_mask(n: int, stops: list[Stop]) -> npt.NDArray[np.bool_]:

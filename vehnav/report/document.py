@@ -143,7 +143,12 @@ def _alignment(alignment: Alignment, start_ns: int) -> dict[str, Any]:
         "gyro_bias_dph": (alignment.gyro_bias / DEG_PER_HOUR).tolist(),
         "rest_force_m_s2": alignment.rest_force,
         "gravity_m_s2": alignment.gravity,
-        "accel_scale": alignment.accel_scale,
+        "accel_bias_along_gravity_m_s2": None
+        if alignment.rest_force is None
+        else alignment.rest_force - alignment.gravity,
+        "accel_scale_error_instead": None
+        if alignment.rest_force is None
+        else alignment.rest_force / alignment.gravity - 1.0,
     }
 
 

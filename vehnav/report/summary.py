@@ -92,8 +92,9 @@ def _start(run: Run) -> list[str]:
     ]
     if a.rest_force is not None:
         lines.append(
-            f"           |f| at rest {a.rest_force:.3f} m/s2, gravity {a.gravity:.3f}: scale "
-            f"{a.accel_scale:.4f} or bias {a.rest_force - a.gravity:+.3f} m/s2 along it"
+            f"           |f| at rest {a.rest_force:.3f} m/s2, gravity {a.gravity:.3f}: bias "
+            f"{a.rest_force - a.gravity:+.3f} m/s2 taken out (or scale "
+            f"{100.0 * (a.rest_force / a.gravity - 1.0):+.2f} %)"
         )
     if a.local:
         lines.append("           LOCAL FRAME: position or heading are not known")

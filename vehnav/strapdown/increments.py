@@ -19,6 +19,8 @@ Holding = Literal["cubic", "trapezoid", "left", "right"]
 
 GAP_FACTOR = 1.5
 """A step longer than this many median steps is a gap (cli.md, Gaps)."""
+HOLD = 0.5
+"""s beside a long gap whose mean rate is held over it."""
 MAX_UNEVEN = 3.0
 """4-point weights are used while neighbouring steps differ by less than this factor: beyond it
 they blow up (noise gain 5.3 at a factor of 20; spec A 5.4)."""
@@ -117,7 +119,19 @@ def increments_from_rates(
     gaps = gap_steps(t)
     integral = _quadrature(t, both, gaps, holding)
     coast = gaps & (np.diff(t) > max_gap)
+    for k in np.flatnonzero(coast):
+        integral[k, :3] = _held_rate(t, omega_ib_b, int(k)) * (t[k + 1] - t[k])
     return Increments(t, integral[:, :3], integral[:, 3:], coast)
+
+
+def _held_rate(t: Array, omega: Array, k: int) -> Array:
+    """(3,) rate held over the gap after sample k: the mean over the HOLD seconds on both sides.
+
+    A single sample at each edge would carry its vibration over the whole gap.
+    """
+    before = (t <= t[k]) & (t > t[k] - HOLD)
+    after = (t >= t[k + 1]) & (t < t[k + 1] + HOLD)
+    return np.asarray(0.5 * (omega[before].mean(axis=0) + omega[after].mean(axis=0)))
 
 
 def increments_from_log(t: Array, dtheta: Array, dvel: Array, *, max_gap: float) -> Increments:
