@@ -275,8 +275,11 @@ def find_messages(
         anchors.append(following)
         more, stop = walk(data, following)
         starts += more
-    trusted = np.union1d(trusted, np.array(anchors, np.int64))
-    return _merge(data, np.unique(np.array(starts, np.int64)), trusted, stop, breaks)
+    walked = np.array(starts, np.int64)
+    if anchors:
+        trusted = np.union1d(trusted, np.array(anchors, np.int64))
+        walked = np.unique(walked)
+    return _merge(data, walked, trusted, stop, breaks)
 
 
 def _trusted(data: Bytes, indexes: Indexes) -> Ints:
@@ -289,7 +292,8 @@ def _trusted(data: Bytes, indexes: Indexes) -> Ints:
         heads = rec.heads_at(data, at)
         same = (heads["opcode"] == rec.MESSAGE) & (heads["channel"] == channel)
         parts.append(at[same & (heads["log"] == inside["log"])])
-    return np.unique(np.concatenate(parts))
+    joined = np.concatenate(parts)
+    return joined if np.all(joined[1:] > joined[:-1]) else np.unique(joined)
 
 
 def _resume(data: Bytes, begin: int, known: npt.NDArray[np.bool_], trusted: Ints) -> int | None:

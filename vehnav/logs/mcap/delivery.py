@@ -78,15 +78,17 @@ class Delivery:
         """
         ids = heads["channel"]
         for channel_id in np.flatnonzero(np.bincount(ids)).tolist():
-            mine = np.flatnonzero(ids == channel_id)
+            rows = np.flatnonzero(ids == channel_id)
+            number = rows.size
+            mine = slice(None) if number == ids.size else rows  # the first: no copies
             topic = self.topic(channel_id)
             if topic is None:
-                self.unknown[channel_id] = self.unknown.get(channel_id, 0) + mine.size
+                self.unknown[channel_id] = self.unknown.get(channel_id, 0) + number
                 continue
             if count:
                 topic.see(heads["log"][mine].astype(np.int64))
             if topic.unlearnt:
-                self.learn(topic, data, int(at[mine[0]]), heads[mine[0]])
+                self.learn(topic, data, int(at[mine][0]), heads[mine][0])
             if topic.collectors:
                 topic.add(batch_of(data, at[mine], heads[mine]), state)
 
