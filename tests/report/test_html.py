@@ -213,6 +213,29 @@ def test_a_log_without_gps_or_findings_has_a_page(city: Run) -> None:
     assert "Nothing was found." in found.text
 
 
+@pytest.mark.parametrize("fixes", ["one", "other day"])
+def test_gps_that_shows_nothing_has_a_page(city: Run, fixes: str) -> None:
+    gnss = city.log.gnss
+    assert gnss is not None
+    if fixes == "one":
+        gnss = dataclasses.replace(
+            gnss, t_ns=gnss.t_ns[9:10], lat=gnss.lat[9:10], lon=gnss.lon[9:10],
+            height=gnss.height[9:10], v_n=None, sigma_pos=None, sigma_vel=None,
+        )  # fmt: skip
+    else:
+        gnss = dataclasses.replace(gnss, t_ns=gnss.t_ns + 86_400 * 10**9)
+    empty = dataclasses.replace(
+        city, log=dataclasses.replace(city.log, gnss=gnss), errors=None, method_errors={}
+    )
+    assert "no fix is left to compare with" in Page(render_html(empty, document(empty))).text
+
+
+def test_a_drive_without_stops_has_a_page(city: Run) -> None:
+    config = Config(start=45.0, end=70.0, start_attitude=(30.0, 0.0, 0.0))
+    found = Page(render_html(moving := run(city.log, config), document(moving)))
+    assert "No stop was found." in found.text
+
+
 def test_a_long_drive_stays_small(city: Run) -> None:
     """An hour and a quarter at 100 Hz, never straight: a third of the 5 MB that a page may have."""
     n = 450_000

@@ -59,6 +59,7 @@ def test_a_line_is_cut_at_a_gap_and_only_there() -> None:
     t = np.concatenate([np.arange(0.0, 10.0), np.arange(30.0, 40.0)])
     assert between_gaps(t) == [slice(0, 10), slice(10, 20)]
     assert between_gaps(t[:1]) == [slice(0, 1)]
+    assert between_gaps(t[:0]) == []
 
 
 def _inside(radius: float, large: float, small: float) -> float:

@@ -69,7 +69,7 @@ def envelope(x: Array, y: Array, bins: int) -> Index:
 def between_gaps(x: Array, *, factor: float = 5.0, least: float = 2.0) -> list[slice]:
     """Slices of a series between its gaps: steps over ``factor`` medians and over ``least``."""
     if x.size < 2:
-        return [slice(0, x.size)]
+        return [slice(0, 1)] if x.size else []
     step = np.diff(x)
     cuts = np.flatnonzero(step > max(factor * float(np.median(step)), least)) + 1
     edges = [0, *cuts.tolist(), x.size]
