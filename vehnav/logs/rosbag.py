@@ -97,6 +97,7 @@ def _read(
     used = _gather(chosen)
     wanted = [c for c in reader.connections if of_connection[c.id, id(c.owner)] in used]
     damage = _pour(path, reader.messages(wanted) if wanted else [], of_connection)
+    topics.flush()
     return Assembler(path, topics, options).log(chosen, damage, notes)
 
 

@@ -154,6 +154,7 @@ class _Reading:
                 self.topics.gather_all()
             for file in with_data:
                 self._read_messages(file)
+            self.topics.flush()
         finally:
             for file in opened:
                 file.source.close()

@@ -18,6 +18,11 @@ from vehnav.logs.messages.stamps import Clock
 from vehnav.logs.messages.types import Struct
 
 Ints = npt.NDArray[np.int64]
+FEW = 1000
+"""Messages of a topic in one chunk below which they are decoded together with the next ones."""
+MAX_WAITING = 16 << 20
+"""Bytes of them that wait at most."""
+
 State = Literal["sound", "unverified", "recovered"]
 
 
@@ -133,6 +138,36 @@ def _widen(span: tuple[int, int] | None, times: Ints) -> tuple[int, int]:
 
 
 @dataclass
+class Waiting:
+    """Payloads of one size from small batches, until they are worth a decoder's trouble."""
+
+    state: State
+    size: int
+    count: int = 0
+    payloads: list[npt.NDArray[Any]] = field(default_factory=list)
+    log_ns: list[Ints] = field(default_factory=list)
+    publish_ns: list[Ints] = field(default_factory=list)
+
+    def append(self, batch: Batch) -> int:
+        """Copy a batch's payloads; how many wait now."""
+        places = batch.data.size - self.size + 1
+        window: npt.NDArray[Any] = np.ndarray((places,), f"V{self.size}", batch.data, 0, (1,))
+        self.payloads.append(window[batch.start])
+        self.log_ns.append(batch.log_ns)
+        self.publish_ns.append(batch.publish_ns)
+        self.count += batch.start.size
+        return self.count
+
+    def batch(self) -> Batch:
+        """All of them side by side."""
+        data = np.concatenate(self.payloads).view(np.uint8)
+        start = self.size * np.arange(self.count, dtype=np.int64)
+        size = np.full(self.count, self.size, np.int64)
+        log_ns, publish_ns = np.concatenate(self.log_ns), np.concatenate(self.publish_ns)
+        return Batch(data, start, size, log_ns, publish_ns)
+
+
+@dataclass
 class Topic:
     """A topic: its messages' declaration, what could be used of it, what was seen of it.
 
@@ -164,6 +199,7 @@ class Topic:
     collectors: list[Collector] = field(default_factory=list)
     clock: Clock | None = None
     used_as: list[str] = field(default_factory=list)
+    waiting: Waiting | None = None
 
     @property
     def unlearnt(self) -> bool:
@@ -191,9 +227,26 @@ class Topic:
         return collector
 
     def add(self, batch: Batch, state: State) -> None:
-        """Messages for all that is collected."""
+        """Messages for all that is collected; few of them wait for more."""
+        size = int(batch.size[0]) if batch.size.size else 0
+        few = 0 < batch.size.size < FEW and 0 < size <= MAX_WAITING // FEW
+        if few and np.all(batch.size == size):
+            if self.waiting and (self.waiting.state, self.waiting.size) != (state, size):
+                self.flush()
+            self.waiting = self.waiting or Waiting(state, size)
+            if self.waiting.append(batch) >= FEW:
+                self.flush()
+            return
+        self.flush()
         for collector in self.collectors:
             collector.add(batch, state)
+
+    def flush(self) -> None:
+        """Decode what waits."""
+        waiting, self.waiting = self.waiting, None
+        if waiting is not None:
+            for collector in self.collectors:
+                collector.add(waiting.batch(), waiting.state)
 
 
 class Topics:
@@ -213,6 +266,11 @@ class Topics:
         """A first message of a topic that its schema does not explain."""
         topic.learn(payload)
         self._gather(topic)
+
+    def flush(self) -> None:
+        """Decode what waits."""
+        for topic in self:
+            topic.flush()
 
     def _gather(self, topic: Topic) -> None:
         if self._gather_new:
