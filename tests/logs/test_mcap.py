@@ -252,7 +252,14 @@ def test_fixes_without_status_are_rejected_and_counted(tmp_path):
 def test_the_clock_is_stated_and_can_be_chosen(tmp_path):
     d = drive()
     data = mcap(ros_drive(d))
-    assert "header time" in found(read(tmp_path, data), "clock")
+    log = read(tmp_path, data)
+    assert "header time" in found(log, "clock")
+    assert log.imu.axes == "FLU"
+    clock = log.contents[0]["clock"]
+    assert clock["stamps"] == "header"
+    assert clock["offset_s"] == pytest.approx(1e-3)
+    assert clock["step_s"] == pytest.approx([0.01] * 5)
+    assert (clock["backward"], clock["repeated"], clock["gaps"]) == (0, 0, 0)
     log = read(tmp_path, data, time="log")
     np.testing.assert_array_equal(log.imu.t_ns, d.t + MS)
 

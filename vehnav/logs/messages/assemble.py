@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from dataclasses import asdict, replace
 from typing import Any, cast
 
 import numpy as np
@@ -120,7 +121,7 @@ class Assembler:
             raise UnusableError(candidate, str(error)) from error
         self.findings += findings
         self._unix = clock.unix
-        return imu, clock
+        return replace(imu, axes=candidate.role.axes), clock
 
     def _gnss(self, candidate: Candidate, base: Clock | None) -> Gnss | None:
         _, columns = self._columns(candidate)
@@ -279,4 +280,12 @@ def contents_row(topic: Topic) -> dict[str, Any]:
         "used_as": ", ".join(topic.used_as),
         "could_be": ", ".join(dict.fromkeys(choice.NAMES[role.name] for role in topic.roles)),
         "problem": topic.problem,
+        "clock": _clock_row(topic.clock),
     }
+
+
+def _clock_row(clock: Clock | None) -> dict[str, Any] | None:
+    """The stamps that were chosen and how they run against log time, for a topic that is used."""
+    if clock is None:
+        return None
+    return {"stamps": clock.name, "reason": clock.reason, **asdict(clock.stats)}

@@ -8,7 +8,7 @@ underscores. Units: what the type's documentation says; rows below name the sour
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, replace
 from typing import Literal
 
 from vehnav.logs.messages.types import Array, Path, Scalar, Struct, Text, Type, plain, structs
@@ -85,6 +85,8 @@ class Role:
     frame : Path or None
         The leaf of the frame id.
     sampling : {"rates", "increments"}
+    axes : str
+        Where the axes point by the type's documentation: FLU for ROS (REP 103), FRD for PX4.
     """
 
     name: RoleName
@@ -93,7 +95,7 @@ class Role:
     stamps: tuple[Stamp, ...] = ()
     frame: Path | None = None
     sampling: Literal["rates", "increments"] = "rates"
-    notes: tuple[str, ...] = field(default=())
+    axes: str = "FLU"
 
     def wanted(self) -> dict[Path, tuple[str, int]]:
         """Leaf -> (quantity, column), as decoders take it."""
@@ -153,7 +155,8 @@ def _imu(path: Path, fields: Fields, chain: Chain) -> Role | None:
     accel = _named_triple(path, fields, ACCEL)
     if gyro is None or accel is None or gyro[1] != accel[1]:
         return None
-    return _role("imu", path, chain, {"gyro": gyro[0], "accel": accel[0]}, gyro[1])
+    role = _role("imu", path, chain, {"gyro": gyro[0], "accel": accel[0]}, gyro[1])
+    return replace(role, axes="FRD") if chain[-1].name.startswith("px4_msgs") else role
 
 
 def _named_triple(
