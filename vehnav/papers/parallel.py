@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import multiprocessing
 import os
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
-from typing import TypeVar
+from contextlib import contextmanager
+from typing import Final, TypeVar
 
 T = TypeVar("T")
 R = TypeVar("R")
+
+_BLAS_THREADS: Final = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
 
 
 def cores() -> int:
@@ -31,5 +34,23 @@ def by_processes(work: Callable[[T], R], items: Iterable[T]) -> list[R]:
     if cores() == 1 or len(todo) == 1:
         return [work(item) for item in todo]
     context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(min(cores(), len(todo)), mp_context=context) as pool:
+    with (
+        _single_threaded_children(),
+        ProcessPoolExecutor(min(cores(), len(todo)), mp_context=context) as pool,
+    ):
         return list(pool.map(work, todo))
+
+
+@contextmanager
+def _single_threaded_children() -> Iterator[None]:
+    """Processes started inside do their linear algebra on one core each: they share the cores."""
+    before = {name: os.environ.get(name) for name in _BLAS_THREADS}
+    os.environ.update(dict.fromkeys(_BLAS_THREADS, "1"))
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = value
