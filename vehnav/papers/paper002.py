@@ -25,8 +25,9 @@ Array = npt.NDArray[np.float64]
 
 PUBLISHED_M = float(np.hypot(555.0, 100.0))
 """555 m north, 100 m east."""
-STRONG = 10.0
-"""times smaller: what figure 1 of the paper shows for the east velocity."""
+STRONG, STRONG_SOON = 10.0, 3.0
+"""times smaller: what figure 1 of the paper shows for the east velocity over the whole drive; and
+over ten minutes, in which the free errors have hardly begun to grow."""
 RATE_HZ = 50.0
 LABELS = {
     "free": "nothing",
@@ -98,7 +99,11 @@ def rows(*, fast: bool = False) -> list[Row]:
         scenarios = [f"paper002,seed={seed}" for seed in range(1, 21)]
         what = "20 city drives of 4538 s, 33 km, extent 5 km"
     found = by_processes(one_drive, scenarios)
-    return [_velocity(found, what), _position(found, what, fast=fast), *_methods(found, what)]
+    return [
+        _velocity(found, what, STRONG_SOON if fast else STRONG),
+        _position(found, what, fast=fast),
+        *_methods(found, what),
+    ]
 
 
 def _figures(found: list[DriveResult], name: str) -> tuple[float, float]:
@@ -107,7 +112,7 @@ def _figures(found: list[DriveResult], name: str) -> tuple[float, float]:
     return float(np.median(radial)), float(np.percentile(radial, 90))
 
 
-def _velocity(found: list[DriveResult], what: str) -> Row:
+def _velocity(found: list[DriveResult], what: str, bar: float) -> Row:
     free, both = (
         float(np.median([drive.east_velocity[name] for drive in found]))
         for name in ("free", "as_published")
@@ -118,8 +123,8 @@ def _velocity(found: list[DriveResult], what: str) -> Row:
         "both procedures take most of the velocity error away (figure 1)",
         f"{what}, HG1700, true start; stops found as in `vehnav run`",
         f"rms of the east velocity {free:.2f} to {both:.2f} m/s ({free / both:.0f} times)",
-        at_least(free / both, STRONG),
-        f"bar: {STRONG:g} times",
+        at_least(free / both, bar),
+        f"bar: {bar:g} times",
         {"free_m_s": free, "as_published_m_s": both},
     )
 
