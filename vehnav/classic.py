@@ -14,10 +14,11 @@ import numpy.typing as npt
 
 from vehnav.alignment import Rest, gyro_bias, mean_over_rest, track_random_walk
 from vehnav.earth import Ellipsoid
+from vehnav.errors import Finding
 from vehnav.legs import LegNoise
 from vehnav.rest import white_noise
 from vehnav.rotation import angles_from_c_nb, c_nb_from_angles
-from vehnav.stops import Stop, stop_numbers
+from vehnav.stops import MARGIN_WARNING, Stop, stop_numbers
 from vehnav.strapdown.eci import mechanize_eci
 from vehnav.strapdown.enu import Solution, StopControl, mechanize_enu
 from vehnav.strapdown.increments import Increments
@@ -27,6 +28,8 @@ Array = npt.NDArray[np.float64]
 GUARD = 0.3
 """s before the end of a stop at which levelling ends: 0.5 s of levelling under way cost 38 m a
 minute later (spec A 4.3)."""
+FAST_STOP = 3.0
+"""m/s before the reset above which a stop is reported (spec C 1)."""
 MEAN_OFFSET = 0.5
 """s in the gain 1/(t + 0.5 s): the running mean since levelling began (spec A 4.3, spec C 3)."""
 
@@ -298,3 +301,37 @@ def noise_from_rest(
         level=level,
         gravity=9.81,
     )
+
+
+def stop_findings(
+    stops: list[Stop], records: list[StopRecord], t_ns: npt.NDArray[np.int64]
+) -> list[Finding]:
+    """Stops that barely passed, and those that the solution reached too fast: one line a kind."""
+    near = [k for k, stop in enumerate(stops) if stop.margin > MARGIN_WARNING]
+    fast = [k for k, record in enumerate(records) if record.speed_before_reset > FAST_STOP]
+    findings = []
+    if near:
+        worst = max(near, key=lambda k: stops[k].margin)
+        text = (
+            f"{_numbers(near)} near the threshold: the margin of stop {worst + 1} is "
+            f"{stops[worst].margin:.2f} of 1"
+        )
+        findings.append(Finding("stop-margin", "warning", text, *_span(stops, near, t_ns)))
+    if fast:
+        worst = max(fast, key=lambda k: records[k].speed_before_reset)
+        text = (
+            f"{_numbers(fast)} reached with a dead-reckoned speed of over {FAST_STOP:g} m/s "
+            f"({records[worst].speed_before_reset:.1f} m/s at stop {worst + 1}): the errors of the "
+            "leg before are that large, or it is no stop"
+        )
+        findings.append(Finding("stop-speed", "warning", text, *_span(stops, fast, t_ns)))
+    return findings
+
+
+def _numbers(indices: list[int]) -> str:
+    listed = ", ".join(str(k + 1) for k in indices[:8]) + (", ..." if len(indices) > 8 else "")
+    return f"stop {listed} was" if len(indices) == 1 else f"stops {listed} were"
+
+
+def _span(stops: list[Stop], indices: list[int], t_ns: npt.NDArray[np.int64]) -> tuple[int, int]:
+    return int(t_ns[stops[indices[0]].first]), int(t_ns[stops[indices[-1]].last])

@@ -16,10 +16,18 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from vehnav.classic import Corrections, Drive, Outcome, Start, StopRecord, noise_from_rest
+from vehnav.classic import (
+    Corrections,
+    Drive,
+    Outcome,
+    Start,
+    StopRecord,
+    noise_from_rest,
+    stop_findings,
+)
 from vehnav.config import Config
 from vehnav.earth import ELLIPSOIDS
-from vehnav.errors import Finding, LogError, VehnavError
+from vehnav.errors import ConfigError, Finding, LogError, VehnavError
 from vehnav.evaluation import Errors, compare
 from vehnav.legs import LegNoise
 from vehnav.logs.log import Gnss, Log
@@ -27,7 +35,6 @@ from vehnav.offline import run_stops
 from vehnav.prepare import Samples, hopeless_gaps, prepare_samples, usable_imu
 from vehnav.start import Alignment, Given, GpsUse, find_start
 from vehnav.stops import (
-    MARGIN_WARNING,
     RMS_RULE,
     Stop,
     StopRule,
@@ -42,8 +49,6 @@ from vehnav.units import DEG, NS
 Array = npt.NDArray[np.float64]
 
 DEFAULTS: Final = Config()
-FAST_STOP: Final = 3.0
-"""m/s before the reset above which a stop is reported."""
 VARIANT_RATE: Final = 10.0
 """Hz at which the tracks of the other methods are kept."""
 
@@ -164,6 +169,7 @@ def run(log: Log, config: Config = DEFAULTS) -> Run:
         config.frame,
         config.levelling_rate,
     )
+    _check_levelling_rate(config, samples)
     gnss = log.gnss if config.gps != "none" else None
     noise = noise_from_rest(drive)
 
@@ -180,7 +186,7 @@ def run(log: Log, config: Config = DEFAULTS) -> Run:
     judged = {} if log.gnss is None else _judge_all(trajectory, variants, log.gnss, gps)
     errors, before = judged.pop("", None), judged.pop("before", None)
     findings = [*log.findings, *samples.findings, *start_findings]
-    findings += _stop_findings(stops, outcome.records, samples)
+    findings += stop_findings(stops, outcome.records, samples.t_ns)
     findings += [] if errors is None else list(errors.findings)
     return Run(
         log, config, samples.axes, trajectory, stops, outcome.records, alignment, gps,
@@ -270,6 +276,16 @@ def _samples(log: Log, config: Config) -> Samples:
         mount=(roll, pitch, yaw),
         max_gap=config.max_gap,
     )
+
+
+def _check_levelling_rate(config: Config, samples: Samples) -> None:
+    """ConfigError where the levelling loop would not settle: k g dt must stay below 1 (A 4.3)."""
+    longest = float(np.max(np.diff(samples.t)))
+    if config.levelling_rate is not None and config.levelling_rate * longest >= 1.0:
+        raise ConfigError(
+            f"--levelling-rate {config.levelling_rate:g} 1/s: times the longest step, "
+            f"{longest:.3f} s, it must stay below 1"
+        )
 
 
 def _given(config: Config) -> Given:
@@ -365,21 +381,3 @@ def _judge_all(
         with suppress(VehnavError):
             judged["before"] = compare(trajectory, gnss, exclude=[(first_stop, 2**62)])
     return judged
-
-
-def _stop_findings(stops: list[Stop], records: list[StopRecord], samples: Samples) -> list[Finding]:
-    """Stops that barely passed, and those that the solution entered too fast."""
-    findings = []
-    for k, (stop, record) in enumerate(zip(stops, records, strict=True)):
-        span = int(samples.t_ns[stop.first]), int(samples.t_ns[stop.last])
-        if stop.margin > MARGIN_WARNING:
-            text = f"stop {k + 1} is near the threshold (margin {stop.margin:.2f} of 1)"
-            findings.append(Finding("stop-margin", "warning", text, *span))
-        if record.speed_before_reset > FAST_STOP:
-            text = (
-                f"stop {k + 1}: the dead-reckoned speed was {record.speed_before_reset:.1f} m/s "
-                "before the reset; either the errors of the leg before are that large, or this is "
-                "no stop"
-            )
-            findings.append(Finding("stop-speed", "warning", text, *span))
-    return findings

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import shlex
+import sys
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -66,6 +68,10 @@ RUN_FIELDS = (
 @option(
     "output", "--output-rate", type=NumberType(min=0, min_open=True), metavar="HZ",
     help="Rows a second in the trajectory files.  [default: every IMU sample]",
+)  # fmt: skip
+@click.option(
+    "--plots", metavar="DIR",
+    help="Also draw the figures of the report here, as PNG and PDF (pip install vehnav[plots]).",
 )  # fmt: skip
 @option(
     "method", "--method", type=click.Choice(["stops", "free"]), default="stops",
@@ -215,13 +221,14 @@ def _write(result: Run, folder: Path, options: dict[str, Any], *, quiet: bool) -
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise ConfigError(f"{folder}: cannot be made: {error.strerror}") from error
+    command = shlex.join(["vehnav", *sys.argv[1:]])
     paths = [folder / name for name in RESULTS] + [Path(path) for path in options["outputs"]]
     with progress(f"{folder}: writing", quiet=quiet):
         for path in paths:
             if path.suffix == ".json":
                 write_document(content, path)
             elif path.suffix == ".html":
-                write_html(result, content, path)
+                write_html(result, content, path, command=command)
             else:
                 write_trajectory(
                     result.trajectory,
@@ -231,6 +238,10 @@ def _write(result: Run, folder: Path, options: dict[str, Any], *, quiet: bool) -
                     errors=result.errors,
                     gnss=result.log.gnss,
                 )
+        if options["plots"]:
+            from vehnav.report.plots import write_plots
+
+            write_plots(result, Path(options["plots"]))
     return content
 
 

@@ -6,6 +6,7 @@ import math
 from typing import Final
 
 from vehnav.pipeline import Run
+from vehnav.report.circle import radius_95
 from vehnav.report.document import log_sources
 from vehnav.units import DEG, DEG_PER_HOUR, NS
 
@@ -141,10 +142,10 @@ def _answer(run: Run) -> list[str]:
     lines = ["", f"result     {answer(run)}"]
     if run.errors is not None and run.errors.states.sigma_pos is not None:
         sigma = run.errors.states.sigma_pos[-1, :2]
-        expected = 2.4477 * math.sqrt(0.5 * float(sigma @ sigma))
+        expected = float(radius_95(sigma))
         lines.append(f"           expected without GPS: {metres(expected)} (95 %) at the end")
     elif run.trajectory.sigma_pos is not None:
         sigma = run.trajectory.sigma_pos[-1, :2]
-        expected = 2.4477 * math.sqrt(0.5 * float(sigma @ sigma))
+        expected = float(radius_95(sigma))
         lines.append(f"           expected error at the end: {metres(expected)} (95 %)")
     return lines
