@@ -247,7 +247,7 @@ def _with_siblings(
 
 def _beside(options: ReadOptions) -> ReadOptions:
     """Options for a file kept beside the recording: nothing that is said of the recording."""
-    return replace(options, gps_file=None, speed_file=None, preset=None)
+    return replace(options, gps_file=None, speed_file=None, preset=None, imu_topic=None)
 
 
 def read_gnss(path: str, options: ReadOptions = DEFAULTS) -> tuple[Gnss, list[Finding]]:
