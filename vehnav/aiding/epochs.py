@@ -1,0 +1,225 @@
+"""One epoch of the land filter: covariance to the epoch, then its measurements, as kernels."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+from vehnav.aiding.blocks import attitude_of, place_of, velocity_of
+from vehnav.aiding.error_model import fill_error_matrix
+from vehnav.aiding.kalman import propagate, transition_rows, update
+from vehnav.aiding.measurements import (
+    gnss_position,
+    gnss_velocity,
+    no_lift,
+    no_side_slip,
+    odometer,
+    zero_rate,
+    zero_velocity,
+)
+from vehnav.aiding.vehicle import ACCEL_SCALE, GYRO_SCALE, LIFT, MOUNT_PITCH, MOUNT_YAW, SIDE, Noise
+from vehnav.earth import Ellipsoid
+from vehnav.kernel import kernel
+from vehnav.rotation import Mat3, Vec3, mat_vec
+from vehnav.strapdown.wander import earth_axis, relative_rate
+
+Array = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
+
+ZUPT: Final = 0
+ZARU: Final = 1
+NHC: Final = 2
+ODOMETER: Final = 3
+GNSS: Final = 4
+GNSS_VELOCITY: Final = 5
+KINDS: Final = ("zupt", "zaru", "nhc", "odometer", "gnss", "gnss velocity")
+
+
+@kernel
+def predict(
+    p: Array,
+    row: Array,
+    rate: Vec3,
+    force: tuple[float, float],
+    dt: float,
+    phi: Array,
+    decay: Array,
+    work: Array,
+    noise: Noise,
+    absolute: bool,
+    earth: Ellipsoid,
+) -> None:
+    """Covariance over an epoch of ``dt`` s around the state ``row``; writes Phi and decay too.
+
+    ``rate`` (rad/s) and ``force`` (right and forward, m/s2): means over the epoch, body axes.
+    """
+    f = work[:9]
+    f[:, :] = 0.0
+    place, v, c_wb = place_of(row), velocity_of(row), attitude_of(row)
+    axis = earth_axis(place)
+    omega_ew = relative_rate(axis, row[9], v, absolute, earth.omega_ie, earth)
+    fill_error_matrix(f, axis, row[9], v, c_wb, omega_ew, False, earth)
+    for a in range(9):
+        f[a, GYRO_SCALE] = -rate[2] * f[a, 14]
+        f[a, ACCEL_SCALE] = -force[1] * f[a, 10]
+    g = np.empty((9, 3))
+    for a in range(9):
+        for j in range(3):
+            g[a, j] = f[a, 12 + j]
+    transition_rows(f, dt, phi)
+    kept = np.exp(-dt / noise.slow_time)
+    decay[SIDE] = kept
+    decay[LIFT] = kept
+    propagate(p, phi, decay, work[:9])
+    gyro = noise.gyro + noise.gyro_share * abs(rate[2])
+    accel = noise.accel + noise.accel_share * np.hypot(force[0], force[1])
+    q = gyro * gyro * dt
+    for a in range(9):
+        for b in range(9):
+            p[a, b] += q * (g[a, 0] * g[b, 0] + g[a, 1] * g[b, 1] + g[a, 2] * g[b, 2])
+    for j in range(3):
+        p[3 + j, 3 + j] += accel * accel * dt
+        p[9 + j, 9 + j] += noise.accel_walk * noise.accel_walk * dt
+        p[12 + j, 12 + j] += noise.gyro_walk * noise.gyro_walk * dt
+    p[MOUNT_YAW, MOUNT_YAW] += noise.mount_walk * noise.mount_walk * dt
+    p[MOUNT_PITCH, MOUNT_PITCH] += noise.mount_walk * noise.mount_walk * dt
+    speed = np.sqrt(v[0] * v[0] + v[1] * v[1])
+    extra = noise.slow_turn * abs(rate[2]) + noise.slow_speed * speed
+    side, up = noise.side_slow + extra, noise.up_slow + extra
+    p[SIDE, SIDE] += side * side * (1.0 - kept * kept)
+    p[LIFT, LIFT] += up * up * (1.0 - kept * kept)
+
+
+@kernel
+def open_gap(p: Array, c_wb: Mat3, attitude: Vec3, velocity: float, length: float) -> None:
+    """Add what a gap leaves open (:mod:`vehnav.aiding.gaps`); ``attitude`` in body axes."""
+    for a in range(3):
+        for b in range(3):
+            for j in range(3):
+                p[6 + a, 6 + b] += c_wb[3 * a + j] * c_wb[3 * b + j] * attitude[j] ** 2
+        p[3 + a, 3 + a] += velocity * velocity
+        p[a, a] += 0.25 * (velocity * length) ** 2
+
+
+@kernel
+def measure(
+    kind: int,
+    x: Array,
+    p: Array,
+    h: Array,
+    z: float,
+    r: float,
+    noise: Noise,
+    kept: tuple[Array, Array, Array, IntArray],
+    counts: Array,
+) -> None:
+    """Apply a scalar measurement, write it down for the smoother, count it.
+
+    ``kept``: rows h, gains, (innovation, variance), and the number written; ``counts`` (kinds, 4):
+    used, inflated, rejected, sum of the normalised innovations squared.
+    """
+    rows, gains, numbers, written = kept
+    k = written[0]
+    innovation, s, nis = update(x, p, h, z, r, noise.huber, noise.gate, gains[k])
+    counts[kind, 3] += nis
+    if s == 0.0:
+        counts[kind, 2] += 1.0
+        return
+    counts[kind, 0] += 1.0
+    if nis > noise.huber * noise.huber:
+        counts[kind, 1] += 1.0
+    rows[k] = h
+    numbers[k, 0] = innovation
+    numbers[k, 1] = s
+    written[0] = k + 1
+
+
+@kernel
+def at_rest(
+    x: Array,
+    p: Array,
+    h: Array,
+    row: Array,
+    rate: Vec3,
+    zupt: bool,
+    zaru: bool,
+    noise: Noise,
+    kept: tuple[Array, Array, Array, IntArray],
+    counts: Array,
+    earth: Ellipsoid,
+) -> None:
+    """Zero velocity and zero rate."""
+    v, c_wb, axis = velocity_of(row), attitude_of(row), earth_axis(place_of(row))
+    for j in range(3):
+        if zupt:
+            z = zero_velocity(h, j, v)
+            measure(ZUPT, x, p, h, z, noise.zero_velocity**2, noise, kept, counts)
+    for j in range(3):
+        if zaru:
+            z = zero_rate(h, j, rate, c_wb, axis, earth.omega_ie)
+            measure(ZARU, x, p, h, z, noise.zero_rate**2, noise, kept, counts)
+
+
+@kernel
+def under_way(
+    x: Array,
+    p: Array,
+    h: Array,
+    row: Array,
+    par: Array,
+    rate: Vec3,
+    speed: float,
+    nhc: bool,
+    noise: Noise,
+    kept: tuple[Array, Array, Array, IntArray],
+    counts: Array,
+) -> None:
+    """Non-holonomic constraint and odometer (``speed`` NaN: none)."""
+    v, c_wb = velocity_of(row), attitude_of(row)
+    if nhc:
+        forward = np.sqrt(v[0] * v[0] + v[1] * v[1])
+        extra = noise.turn * abs(rate[2]) + noise.speed * forward
+        z = no_side_slip(h, v, c_wb, rate, par)
+        measure(NHC, x, p, h, z, (noise.side + extra) ** 2, noise, kept, counts)
+        z = no_lift(h, v, c_wb, par)
+        measure(NHC, x, p, h, z, (noise.up + extra) ** 2, noise, kept, counts)
+    if not np.isnan(speed):
+        z = odometer(h, v, c_wb, speed, par)
+        sigma = noise.odometer + noise.odometer_share * abs(speed)
+        measure(ODOMETER, x, p, h, z, sigma * sigma, noise, kept, counts)
+
+
+@kernel
+def from_gnss(
+    x: Array,
+    p: Array,
+    h: Array,
+    row: Array,
+    fix: Array,
+    ago: float,
+    noise: Noise,
+    kept: tuple[Array, Array, Array, IntArray],
+    counts: Array,
+    earth: Ellipsoid,
+) -> None:
+    """A fix: 12 numbers, Earth-fixed position and velocity (NaN: none), and the six variances.
+
+    Variances are along east, north, up; as the wander axes are turned against them, both
+    horizontal ones are taken as their mean.
+    """
+    place, v = place_of(row), velocity_of(row)
+    z = gnss_position(place, row[9], v, (fix[0], fix[1], fix[2]), ago, earth)
+    flat = 0.5 * (fix[6] + fix[7])
+    for j in range(3):
+        h[:] = 0.0
+        h[j] = 1.0
+        measure(GNSS, x, p, h, z[j], flat if j < 2 else fix[8], noise, kept, counts)
+    if not np.isnan(fix[3]):
+        measured = mat_vec(place, (fix[3], fix[4], fix[5]))
+        flat = 0.5 * (fix[9] + fix[10])
+        for j in range(3):
+            gnss_velocity(h, j, place, row[9], v, earth)
+            r = flat if j < 2 else fix[11]
+            measure(GNSS_VELOCITY, x, p, h, v[j] - measured[j], r, noise, kept, counts)

@@ -1,0 +1,181 @@
+"""What a land vehicle adds to the error model: states, noise figures, presets.
+
+A car moves along its own forward axis, up to small constants that the filter finds on the way. In
+body axes right-forward-up, at the sensor, with the speed v along the body's forward axis::
+
+    v_right = mu v - l omega_up + k v^2 omega_up + n_side(t)
+    v_up    = p v + n_up(t)
+
+mu, p: the direction of travel lies to the right and above of the forward axis of the body frame as
+it was mounted; l: the sensor sits in front of the axle that does not slide; k: tyre slip; n: what
+remains, correlated in time, a first-order Gauss-Markov process each. The odometer reads
+``(1 + kappa) v``. As everywhere the error states are estimate minus truth.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from vehnav.units import DEG
+
+Array = npt.NDArray[np.float64]
+
+ODO_SCALE: Final = 15
+MOUNT_YAW: Final = 16
+MOUNT_PITCH: Final = 17
+LEVER: Final = 18
+GYRO_SCALE: Final = 19
+SLIP: Final = 20
+SIDE: Final = 21
+LIFT: Final = 22
+ACCEL_SCALE: Final = 23
+SIZE: Final = 24
+"""Number of states: 15 of the error model, kappa, mu, p, l, gyro z scale, k, n_side, n_up, and the
+scale of the forward accelerometer."""
+
+
+class Noise(NamedTuple):
+    """Noise figures of the filter, one standard deviation, SI.
+
+    Attributes
+    ----------
+    gyro, accel : float
+        White noise while driving, rad/s/sqrt(Hz), m/s2/sqrt(Hz).
+    gyro_share, accel_share : float
+        Added to them, per rad/s of turning and m/s2 of horizontal force: what scale errors, cross
+        axes and jittering stamps do.
+    gyro_walk, accel_walk : float
+        Random walk of the biases, rad/s/sqrt(s), m/s2/sqrt(s).
+    zero_velocity : float
+        m/s, of each 10 Hz zero-velocity update.
+    zero_rate : float
+        rad/s, of a 0.1 s mean at rest.
+    side, up : float
+        m/s, white part of the non-holonomic constraint.
+    turn, speed : float
+        Added to both: m/s per rad/s of turning, and share of the speed.
+    side_slow, up_slow, slow_time : float
+        m/s, m/s and s: the Gauss-Markov parts.
+    slow_turn, slow_speed : float
+        Added to the driving noise of the slow parts: per rad/s of turning, and share of speed.
+    odometer, odometer_share : float
+        m/s and share of the speed, white.
+    mount_walk : float
+        rad/sqrt(s): the body moves on its springs and the load shifts.
+    huber : float
+        Normalised innovations beyond this are weighed down (R inflated).
+    gate : float
+        Normalised innovations beyond this are rejected.
+    """
+
+    gyro: float
+    accel: float
+    gyro_share: float
+    accel_share: float
+    gyro_walk: float
+    accel_walk: float
+    zero_velocity: float
+    zero_rate: float
+    side: float
+    up: float
+    turn: float
+    speed: float
+    side_slow: float
+    up_slow: float
+    slow_time: float
+    slow_turn: float
+    slow_speed: float
+    odometer: float
+    odometer_share: float
+    mount_walk: float
+    huber: float = 2.0
+    gate: float = 30.0
+
+
+@dataclass(frozen=True)
+class Prior:
+    """Standard deviations of what is not known at the start.
+
+    Attributes
+    ----------
+    tilt, heading : float
+        rad
+    velocity : float
+        m/s per axis.
+    position : (3,)
+        m, wander axes.
+    gyro, accel : float
+        rad/s, m/s2, of the biases that remain.
+    odometer, mount, lever, gyro_scale, accel_scale, slip : float
+        1, rad, m, 1, 1, s2/m.
+    """
+
+    tilt: float
+    heading: float
+    velocity: float
+    position: tuple[float, float, float]
+    gyro: float
+    accel: float
+    odometer: float = 0.03
+    mount: float = 4.0 * DEG
+    lever: float = 1.0
+    gyro_scale: float = 0.01
+    accel_scale: float = 0.02
+    slip: float = 0.004
+
+    def covariance(self, noise: Noise) -> Array:
+        """P (24, 24) at the start."""
+        sigma = np.array(
+            [
+                *self.position,
+                *[self.velocity] * 3,
+                self.tilt,
+                self.tilt,
+                self.heading,
+                *[self.accel] * 3,
+                *[self.gyro] * 3,
+                self.odometer,
+                self.mount,
+                self.mount,
+                self.lever,
+                self.gyro_scale,
+                self.slip,
+                noise.side_slow,
+                noise.up_slow,
+                self.accel_scale,
+            ]
+        )
+        return np.asarray(np.diag(sigma**2))
+
+
+MEMS: Final = Noise(
+    gyro=0.02 * DEG,
+    accel=0.01,
+    gyro_share=0.001,
+    accel_share=0.02,
+    gyro_walk=9e-4 * DEG,
+    accel_walk=1.5e-3,
+    zero_velocity=0.2,
+    zero_rate=0.1 * DEG,
+    side=0.15,
+    up=0.05,
+    turn=0.5,
+    speed=0.008,
+    side_slow=0.0,
+    up_slow=0.0,
+    slow_time=2.0,
+    slow_turn=0.0,
+    slow_speed=0.0,
+    odometer=0.1,
+    odometer_share=0.01,
+    mount_walk=0.0,
+)
+"""Spec C section 4, consumer and industrial MEMS."""
+TACTICAL: Final = MEMS._replace(
+    gyro=0.01 * DEG, accel=0.005, gyro_walk=9e-5 * DEG, accel_walk=5e-4, zero_rate=0.03 * DEG
+)
+"""Spec C section 4, tactical grade (fibre-optic, ring laser, the best MEMS)."""
