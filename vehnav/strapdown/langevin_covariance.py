@@ -25,7 +25,7 @@ def radii_slopes(lat: float, earth: Ellipsoid) -> tuple[float, float]:
 
 
 def gravity_slope(lat: float, height: float, earth: Ellipsoid) -> float:
-    """Derivative of gamma by latitude, m/s2/rad, of Somigliana's formula with its term of height."""
+    """Derivative of gamma by latitude, m/s2/rad, of Somigliana with its height term."""
     s, c = math.sin(lat), math.cos(lat)
     k = math.sqrt(1.0 - earth.e2) * earth.gamma_p / earth.gamma_e - 1.0
     w2, x = 1.0 - earth.e2 * s * s, height / earth.a
