@@ -6,10 +6,13 @@ pipeline alone unpacks it into the keyword arguments of the physics.
 
 from __future__ import annotations
 
+import math
 from dataclasses import asdict, dataclass
 from typing import Any, Literal
 
 from vehnav.errors import ConfigError
+
+AIDS = ("zupt", "zaru", "nhc", "odometer", "gnss")
 
 
 @dataclass(frozen=True)
@@ -27,14 +30,20 @@ class Config:
         s; longer gaps coast.
     split : bool
         Whether a gap of over 10 s makes two results instead of an error.
-    method : {"stops", "free"}
+    method : {"stops", "free", "filter", "smooth"}
+    aid : tuple of str or None
+        Aids of the filter, of :data:`AIDS`; None: all that the log has except ``gnss``.
+    sensor_grade : {"auto", "mems", "tactical"}
+        Noise of the filter; ``auto``: by the gyro at rest.
+    azimuth : {"relative", "absolute"}
+        Law of the wander axes.
     as_published : bool
         The two procedures of paper 002 alone.
     levelling, reset : bool
         The two procedures.
     causal : bool
         Whether only what was known at the time may be used.
-    frame : {"enu", "eci"}
+    frame : {"enu", "eci", "wander"}
         Of the mechanization.
     vertical : {"clamp", "free"}
     ellipsoid : {"wgs84", "krasovsky"}
@@ -45,8 +54,11 @@ class Config:
     stop_statistic : {"slow", "rms"}
     stop_window, stop_dwell : float or None
         s
-    gps : {"start", "none"}
+    gps : {"start", "none", "aid"}
         What the solution may take from GPS.
+    outage : tuple of str
+        Stretches, s from the start of the log, whose fixes do not aid: ``A:B`` or
+        ``every=180,length=60,from=60``.
     gps_start_seconds : float
         s after the first departure that give the heading.
     start_position : (lat deg, lon deg, height m) or None
@@ -63,12 +75,15 @@ class Config:
     end: float | None = None
     max_gap: float = 0.5
     split: bool = False
-    method: Literal["stops", "free"] = "stops"
+    method: Literal["stops", "free", "filter", "smooth"] = "stops"
+    aid: tuple[str, ...] | None = None
+    sensor_grade: Literal["auto", "mems", "tactical"] = "auto"
+    azimuth: Literal["relative", "absolute"] = "relative"
     as_published: bool = False
     levelling: bool = True
     reset: bool = True
     causal: bool = False
-    frame: Literal["enu", "eci"] = "enu"
+    frame: Literal["enu", "eci", "wander"] = "enu"
     vertical: Literal["clamp", "free"] = "clamp"
     ellipsoid: Literal["wgs84", "krasovsky"] = "wgs84"
     levelling_rate: float | None = None
@@ -76,7 +91,8 @@ class Config:
     stop_statistic: Literal["slow", "rms"] = "slow"
     stop_window: float | None = None
     stop_dwell: float | None = None
-    gps: Literal["start", "none"] = "start"
+    gps: Literal["start", "none", "aid"] = "start"
+    outage: tuple[str, ...] = ()
     gps_start_seconds: float = 60.0
     start_position: tuple[float, float, float] | None = None
     start_heading: float | None = None
@@ -91,6 +107,61 @@ class Config:
             if getattr(self, name) < 0.0:
                 raise ConfigError(f"--{name.replace('_', '-')} must not be negative")
 
+        self._check_aids()
+
+    def _check_aids(self) -> None:
+        unknown = sorted(set(self.aid or ()) - set(AIDS))
+        if unknown:
+            raise ConfigError(f"--aid {','.join(unknown)}: the aids are {', '.join(AIDS)}")
+        if not self.aided and (self.aid is not None or self.gps == "aid"):
+            raise ConfigError("--aid and --gps aid belong to --method filter or smooth")
+        if not self.aided and self.frame == "wander":
+            raise ConfigError("--frame wander belongs to --method filter or smooth")
+        if self.method == "smooth" and self.causal:
+            raise ConfigError("--method smooth looks ahead; with --causal use --method filter")
+        for text in self.outage:
+            outage_spans(text, 0.0)
+        if self.outage and self.gps != "aid":
+            raise ConfigError("--outage cuts out fixes that aid; it belongs to --gps aid")
+
+    @property
+    def aided(self) -> bool:
+        """Whether the method is a filter."""
+        return self.method in ("filter", "smooth")
+
+    @property
+    def tactical(self) -> bool | None:
+        """Grade of the filter noise; None: by the gyro at rest."""
+        return None if self.sensor_grade == "auto" else self.sensor_grade == "tactical"
+
+    def uses(self, aid: str) -> bool:
+        """Whether the filter uses an aid where the log has it."""
+        if self.aid is None:
+            return aid != "gnss" or self.gps == "aid"
+        return aid in self.aid or (aid == "gnss" and self.gps == "aid")
+
     def to_dict(self) -> dict[str, Any]:
         """As plain data, for the report."""
         return asdict(self)
+
+
+def outage_spans(text: str, end: float) -> list[tuple[float, float]]:
+    """Stretches (start, end), s, that ``A:B`` or ``every=S,length=S,from=S`` name up to ``end``.
+
+    >>> outage_spans("every=100,length=20,from=50", 260.0)
+    [(50.0, 70.0), (150.0, 170.0)]
+    """
+    try:
+        if "=" not in text:
+            first, last = (float(x) for x in text.split(":"))
+            if 0.0 <= first < last:
+                return [(first, last)]
+        else:
+            rule = {k.strip(): float(x) for k, x in (p.split("=") for p in text.split(","))}
+            every, length, first = (rule.pop(k) for k in ("every", "length", "from"))
+            if not rule and 0.0 < length < every and first >= 0.0:
+                count = max(0, math.ceil((end - length - first) / every))
+                return [(first + k * every, first + k * every + length) for k in range(count)]
+    except (ValueError, KeyError):
+        pass
+    raise ConfigError(f"--outage {text!r}: expected START:END or every=S,length=S,from=S (seconds)")

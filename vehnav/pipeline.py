@@ -156,7 +156,7 @@ def run(log: Log, config: Config = DEFAULTS) -> Run:
     """
     search = search_stops(log, config)
     samples, stops = search.samples, search.stops
-    if not stops and config.start_attitude is None:
+    if not stops and config.start_attitude is None and not config.aided:
         raise LogError(no_stop_advice(log.path, search))
     drive = Drive(
         samples.t,
@@ -169,6 +169,8 @@ def run(log: Log, config: Config = DEFAULTS) -> Run:
         config.frame,
         config.levelling_rate,
     )
+    if config.aided:
+        return _run_filter(drive, log, config, samples)
     _check_levelling_rate(config, samples)
     gnss = log.gnss if config.gps != "none" else None
     noise = noise_from_rest(drive)
@@ -191,6 +193,19 @@ def run(log: Log, config: Config = DEFAULTS) -> Run:
     return Run(
         log, config, samples.axes, trajectory, stops, outcome.records, alignment, gps,
         errors, before, judged, variants, noise, tuple(findings),
+    )  # fmt: skip
+
+
+def _run_filter(drive: Drive, log: Log, config: Config, samples: Samples) -> Run:
+    """The same with ``--method filter`` or ``smooth``."""
+    aided = run_aided(drive, samples.t_ns, log, config, _given(config))
+    trajectory = _trajectory(aided.outcome, samples, drive.stops)
+    errors = judge_aided(trajectory, log, aided, config)
+    findings = [*log.findings, *samples.findings, *aided.findings]
+    findings += [] if errors is None else list(errors.findings)
+    return Run(
+        log, config, samples.axes, trajectory, drive.stops, aided.outcome.records,
+        aided.alignment, aided.gps, errors, None, {}, {}, None, tuple(findings),
     )  # fmt: skip
 
 
@@ -247,8 +262,9 @@ def no_stop_advice(path: str, search: StopSearch) -> str:
         f"{path}: no stop was found, so neither the level nor the gyro bias is known. The quietest "
         f"moment, at {quiet['time_s']:.1f} s, has {quiet['rate_deg_s']:.3f} deg/s (threshold "
         f"{search.rule.threshold / DEG:.2f}) and {quiet['force_m_s2']:.3f} m/s2 (threshold "
-        f"{search.statistics.force_threshold:.2f}). Give --start-attitude HEADING,PITCH,ROLL, or "
-        "raise --stop-threshold if the vehicle did stand"
+        f"{search.statistics.force_threshold:.2f}). Take --method filter, which can start rolling, "
+        "or give --start-attitude HEADING,PITCH,ROLL, or raise --stop-threshold if the vehicle "
+        "did stand"
     )
 
 

@@ -28,6 +28,7 @@ from vehnav.cli.common import (
     stops_options,
     strict_option,
 )
+from vehnav.cli.options import ParamType
 from vehnav.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -36,13 +37,26 @@ if TYPE_CHECKING:
     from vehnav.logs.log import Log, ReadOptions
     from vehnav.pipeline import Run
 
+
+class AidsType(ParamType):
+    """Names of aids, joined by commas."""
+
+    name = "names"
+
+    def convert(self, value: Any, param: Any, ctx: Any) -> tuple[str, ...]:
+        """Read the names; the library says which there are."""
+        if isinstance(value, str):
+            value = value.split(",")
+        return tuple(str(name).strip() for name in value)
+
+
 RESULTS = ("trajectory.csv", "report.json", "report.html")
 """What every run writes into its folder."""
 RUN_FIELDS = (
     "axes", "accel_axes", "mount", "max_gap", "split", "method", "as_published", "levelling",
     "reset", "causal", "frame", "vertical", "ellipsoid", "levelling_rate", "stop_threshold",
     "stop_statistic", "stop_window", "stop_dwell", "gps", "gps_start_seconds", "start_position",
-    "start_heading", "start_attitude",
+    "start_heading", "start_attitude", "aid", "sensor_grade", "azimuth", "outage",
 )  # fmt: skip
 
 
@@ -74,9 +88,23 @@ RUN_FIELDS = (
     help="Also draw the figures of the report here, as PNG and PDF (pip install vehnav[plots]).",
 )  # fmt: skip
 @option(
-    "method", "--method", type=click.Choice(["stops", "free"]), default="stops",
-    show_default=True,
-    help="stops: corrections at stops, offline; free: no correction.",
+    "method", "--method", type=click.Choice(["stops", "free", "filter", "smooth"]),
+    default="stops", show_default=True,
+    help="stops: corrections at stops, offline; free: no correction; filter: error-state filter; "
+    "smooth: filter and backward smoother.",
+)  # fmt: skip
+@option(
+    "method", "--aid", type=AidsType(), metavar="NAMES",
+    help="Aids of the filter: zupt,zaru,nhc,odometer,gnss.  [default: all that the log has except "
+    "gnss]",
+)  # fmt: skip
+@option(
+    "method", "--sensor-grade", type=click.Choice(["auto", "mems", "tactical"]), default="auto",
+    show_default=True, help="Noise of the filter; auto: by the gyro at rest.",
+)  # fmt: skip
+@option(
+    "method", "--azimuth", type=click.Choice(["relative", "absolute"]), default="relative",
+    show_default=True, help="Wander axes free relative to the Earth or to inertial space.",
 )  # fmt: skip
 @option(
     "method", "--as-published", is_flag=True, default=False,
@@ -95,8 +123,10 @@ RUN_FIELDS = (
     help="Use nothing that looks ahead: no distribution over legs.",
 )  # fmt: skip
 @option(
-    "method", "--frame", type=click.Choice(["enu", "eci"]), default="enu", show_default=True,
-    help="Frame of the mechanization: local East-North-Up (paper 004) or inertial (paper 000).",
+    "method", "--frame", type=click.Choice(["enu", "eci", "wander"]), default="enu",
+    show_default=True,
+    help="Frame of the mechanization: local East-North-Up (paper 004), inertial (paper 000) or "
+    "wander (paper 003; what the filter uses anyway).",
 )  # fmt: skip
 @option(
     "method", "--vertical", type=click.Choice(["clamp", "free"]), default="clamp",
@@ -111,8 +141,13 @@ RUN_FIELDS = (
     help="k g of the levelling, 1/s.  [default: the running mean, 1/(t + 0.5 s)]",
 )  # fmt: skip
 @option(
-    "gps", "--gps", type=click.Choice(["start", "none"]), default="start", show_default=True,
-    help="What GPS may be used for: the start, or nothing.",
+    "gps", "--gps", type=click.Choice(["start", "none", "aid"]), default="start",
+    show_default=True,
+    help="What GPS may be used for: the start, nothing, or aiding all the way (filter, smooth).",
+)  # fmt: skip
+@option(
+    "gps", "--outage", multiple=True, metavar="A:B|every=...",
+    help="Seconds A:B whose fixes do not aid; or every=180,length=60,from=60. Repeatable.",
 )  # fmt: skip
 @option(
     "gps", "--gps-start-seconds", type=NumberType(min=0), default=60.0, show_default=True,

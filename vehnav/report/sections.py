@@ -277,7 +277,7 @@ def option_text(value: Any) -> str:
     if isinstance(value, bool):
         return "yes" if value else "no"
     if isinstance(value, list | tuple):
-        return ",".join(f"{x:.10g}" for x in value)
+        return ",".join(x if isinstance(x, str) else f"{x:.10g}" for x in value)
     return f"{value:.10g}" if isinstance(value, float) else str(value)
 
 

@@ -1,0 +1,223 @@
+"""The filter methods of a run: what GPS may do, the start, the filter, and how it is judged.
+
+``--gps start``: fixes up to ``--gps-start-seconds`` after the first motion aid the filter, the
+later ones judge it. ``--gps aid``: all fixes aid but those that ``--outage`` cuts out, and the
+outages are judged one by one.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+from vehnav.aiding.coarse import AT_ONCE, CoarseStart, coarse_start
+from vehnav.aiding.fixes import Fixes
+from vehnav.aiding.land import LandResult, Use, run_land, tuning_from_log
+from vehnav.classic import Drive, Outcome
+from vehnav.config import Config, outage_spans
+from vehnav.earth import normal_gravity
+from vehnav.errors import Finding, LogError, VehnavError
+from vehnav.evaluation import Errors, compare
+from vehnav.logs.log import Gnss, Log
+from vehnav.start import Alignment, Given, GpsUse
+from vehnav.trajectory import Trajectory
+from vehnav.units import DEG, NS
+
+Array = npt.NDArray[np.float64]
+
+NEAR_POLE: Final = 89.9 * DEG
+"""rad of latitude beyond which East-North-Up columns of the output turn too fast to be of use."""
+FEW_FIXES: Final = 3
+"""Fixes below which GPS gives no start."""
+
+
+@dataclass(frozen=True)
+class Aided:
+    """What a filter method found.
+
+    Attributes
+    ----------
+    outcome : Outcome
+    alignment : Alignment
+    gps : GpsUse
+    outages : tuple of (int, int)
+        ns, stretches whose fixes were cut out.
+    result : LandResult
+        Innovations, parameters, tuning.
+    findings : tuple of Finding
+    """
+
+    outcome: Outcome
+    alignment: Alignment
+    gps: GpsUse
+    outages: tuple[tuple[int, int], ...]
+    result: LandResult
+    findings: tuple[Finding, ...]
+
+
+def run_aided(
+    drive: Drive, t_ns: npt.NDArray[np.int64], log: Log, config: Config, given: Given
+) -> Aided:
+    """Start, filter and smooth a drive.
+
+    Parameters
+    ----------
+    drive : Drive
+    t_ns : (n,) int64
+        Stamps of its instants.
+    log : Log
+        For GPS and speed.
+    config : Config
+    given : Given
+        What the options say of the start.
+
+    Raises
+    ------
+    LogError
+        Neither a stop nor GPS nor a given attitude says how the vehicle starts.
+    """
+    origin = log.start_ns
+    gnss = log.gnss if config.gps != "none" and log.gnss is not None else None
+    cut = outage_intervals(config, origin, int(t_ns[-1])) if config.gps == "aid" else ()
+    fixes, until = (None, None) if gnss is None else _usable(gnss, drive, config, origin, cut)
+    if fixes is None and not drive.stops and given.attitude is None:
+        raise LogError(
+            f"{log.path}: no stop was found and no GPS may be used, so nothing says how the "
+            "vehicle starts; give --gps-file, or --start-attitude HEADING,PITCH,ROLL"
+        )
+    start = coarse_start(
+        drive, fixes, position=given.position, heading=given.heading, attitude=given.attitude
+    )
+    tuning = tuning_from_log(drive, tactical=config.tactical)
+    result = run_land(
+        drive, start, tuning,
+        fixes=fixes if config.uses("gnss") or config.gps == "start" else None,
+        speed=_speed(log, config, origin),
+        use=Use(config.uses("zupt"), config.uses("zaru"), config.uses("nhc")),
+        smooth=config.method == "smooth",
+        absolute=config.azimuth == "absolute",
+    )  # fmt: skip
+    return Aided(
+        result.outcome,
+        _alignment(drive, t_ns, start, given, fixes),
+        _gps_use(fixes, until, config),
+        cut,
+        result,
+        tuple(_findings(start, result, fixes, given)),
+    )
+
+
+def judge_aided(trajectory: Trajectory, log: Log, aided: Aided, config: Config) -> Errors | None:
+    """Errors against GPS: after the start window; with ``--gps aid`` over all fixes."""
+    if log.gnss is None:
+        return None
+    since = aided.gps.until_ns if config.gps == "start" else None
+    try:
+        return compare(
+            trajectory,
+            log.gnss,
+            judge_from_ns=None if since is None else since + 1,
+            estimate_offset=config.gps != "aid",
+            outages=aided.outages,
+            start_ns=log.start_ns,
+        )
+    except VehnavError:
+        return None
+
+
+def outage_intervals(config: Config, start_ns: int, end_ns: int) -> tuple[tuple[int, int], ...]:
+    """The stretches of ``--outage`` in ns; a repeated one ends with the log."""
+    end = (end_ns - start_ns) * NS
+    spans = [span for text in config.outage for span in outage_spans(text, end)]
+    return tuple((start_ns + round(a / NS), start_ns + round(b / NS)) for a, b in spans)
+
+
+def _usable(
+    gnss: Gnss, drive: Drive, config: Config, origin: int, cut: tuple[tuple[int, int], ...]
+) -> tuple[Fixes | None, int | None]:
+    """Fixes that may aid, and up to which stamp they do (None: to the end)."""
+    inside = (gnss.t_ns >= origin + round(drive.t[0] / NS)) & (
+        gnss.t_ns <= origin + round(drive.t[-1] / NS)
+    )
+    until = None
+    if config.gps == "start":
+        at_once = bool(drive.stops) and drive.stops[0].start < drive.t[0] + AT_ONCE
+        departure = drive.stops[0].end if at_once else float(drive.t[0])
+        until = origin + round((departure + config.gps_start_seconds) / NS)
+        inside &= gnss.t_ns <= until
+    for a, b in cut:
+        inside &= (gnss.t_ns < a) | (gnss.t_ns > b)
+    if np.count_nonzero(inside) < FEW_FIXES:
+        return None, None
+    fixes = Fixes(
+        np.asarray((gnss.t_ns - origin) * NS, np.float64), gnss.lat, gnss.lon, gnss.height,
+        gnss.v_n, gnss.sigma_pos, gnss.sigma_vel,
+    )  # fmt: skip
+    return fixes.take(inside), until
+
+
+def _speed(log: Log, config: Config, origin: int) -> tuple[Array, Array] | None:
+    if log.speed is None or not config.uses("odometer"):
+        return None
+    return np.asarray((log.speed.t_ns - origin) * NS, np.float64), log.speed.speed
+
+
+def _alignment(
+    drive: Drive,
+    t_ns: npt.NDArray[np.int64],
+    start: CoarseStart,
+    given: Given,
+    fixes: Fixes | None,
+) -> Alignment:
+    position_from = "option" if given.position is not None else "gps" if fixes else "none"
+    heading_from = "gps" if start.fitted else "none"
+    if given.heading is not None:
+        heading_from = "option"
+    elif given.attitude is not None:
+        heading_from = "attitude option"
+    gravity = float(normal_gravity(start.position[0], start.position[2], drive.earth))
+    return Alignment(
+        time_ns=int(t_ns[start.first]),
+        position=start.position,
+        heading=start.heading,
+        pitch=start.pitch,
+        roll=start.roll,
+        position_from=position_from,
+        heading_from=heading_from,
+        heading_rms=None,
+        gyro_bias=start.gyro_bias,
+        rest_force=gravity / start.accel_scale if drive.stops else None,
+        gravity=gravity,
+    )
+
+
+def _gps_use(fixes: Fixes | None, until: int | None, config: Config) -> GpsUse:
+    if fixes is None:
+        return GpsUse()
+    used_for = ("position", "heading", "aiding")
+    return GpsUse(used_for, int(fixes.t.size), until, window_s=config.gps_start_seconds)
+
+
+def _findings(
+    start: CoarseStart, result: LandResult, fixes: Fixes | None, given: Given
+) -> list[Finding]:
+    tuning = result.tuning
+    findings = [
+        Finding("filter-tuning", "info", f"filter noise of {tuning.name} grade ({tuning.reason})")
+    ]
+    for name, row in result.innovations.items():
+        text = (
+            f"{name}: {row.used} used, {row.inflated} weighed down, {row.rejected} rejected; mean "
+            f"normalised innovation squared {row.mean_nis:.2f}"
+        )
+        findings.append(Finding("filter-innovations", "info", text))
+    if given.heading is None and given.attitude is None and not start.fitted:
+        text = "no course of GPS shows the heading at the start: the frame is only local"
+        findings.append(Finding("local-frame", "warning", text))
+    if np.max(np.abs(result.outcome.position[:, 0])) > NEAR_POLE:
+        text = "beyond 89.9 degrees: east and north of the output turn fast (--coords quasi)"
+        findings.append(Finding("near-pole", "warning", text))
+    return findings
