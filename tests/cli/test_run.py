@@ -235,6 +235,24 @@ def test_troubled_rows_become_findings(tmp_path) -> None:
     assert strict.exit_code == 1
 
 
+def test_errors_after_a_long_gap_are_given_separately(tmp_path, drive) -> None:
+    frame = table()
+    t = (frame.t_ns - frame.t_ns[0]) * 1e-9
+    path = changed(tmp_path, frame[(t < 100.0) | (t > 103.0)])
+    shutil.copy(drive.with_name("drive.gps.csv"), tmp_path / "changed.gps.csv")
+    result = vehnav("run", path, "--json", "--out-dir", tmp_path / "out")
+    assert result.exit_code == 0, result.stderr
+    document = json.loads(result.stdout)
+    (gap,) = document["errors"]["after_gaps"]
+    assert gap["start_s"] == pytest.approx(99.98, abs=0.05)
+    next_stop = min(s["start_s"] for s in document["stops"] if s["start_s"] > 100.0)
+    assert gap["start_s"] + gap["length_s"] == pytest.approx(next_stop, abs=0.05)
+    assert gap["fixes"] > 30
+    screen = vehnav("run", path, "--out-dir", tmp_path / "out").stdout
+    assert "from the gap at 100.0 s to the next stop" in screen
+    jsonschema.validate(document, schema())
+
+
 def test_a_slow_imu_is_refused_with_the_reason(tmp_path, shared_data) -> None:
     result = vehnav(
         "run", shared_data / "boston_ramirez_1hz" / "imu.csv", "--out-dir", tmp_path / "o"

@@ -18,6 +18,7 @@ import numpy as np
 from vehnav._version import __version__
 from vehnav.errors import Finding
 from vehnav.evaluation import Errors
+from vehnav.evaluation.outages import Outage, outage_errors
 from vehnav.evaluation.stop_score import gps_speed, speed_inside
 from vehnav.export.atomic import atomic_path
 from vehnav.logs.log import Gnss, Log
@@ -206,7 +207,26 @@ def _errors(run: Run) -> dict[str, Any] | None:
     if run.errors is None:
         return None
     methods = {name: _horizontal(errors) for name, errors in run.method_errors.items()}
-    return {**run.errors.to_dict(), "methods": methods}
+    after_gaps = [row.to_dict() for row in errors_after_gaps(run)]
+    return {**run.errors.to_dict(), "methods": methods, "after_gaps": after_gaps}
+
+
+def errors_after_gaps(run: Run) -> tuple[Outage, ...]:
+    """Errors from every long gap in the IMU to the next stop, given separately (cli.md, Gaps)."""
+    if run.errors is None:
+        return ()
+    gaps = [f for f in run.findings if f.code == "gap" and f.level != "info"]
+    stops = [run.start_ns + round(stop.start / NS) for stop in run.stops]
+    last = int(run.trajectory.t_ns[-1])
+    spans = [
+        (f.start_ns, next((s for s in stops if s > f.start_ns), last))
+        for f in gaps
+        if f.start_ns is not None
+    ]
+    errors = run.errors
+    return outage_errors(
+        errors.t_ns, errors.horizontal, errors.distance, spans, start_ns=run.start_ns
+    )
 
 
 def _horizontal(errors: Errors) -> dict[str, Any]:

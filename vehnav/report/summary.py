@@ -7,7 +7,7 @@ from typing import Final
 
 from vehnav.pipeline import Run
 from vehnav.report.circle import radius_95
-from vehnav.report.document import log_sources
+from vehnav.report.document import errors_after_gaps, log_sources
 from vehnav.units import DEG, DEG_PER_HOUR, NS
 
 METHOD_NAMES: Final = {
@@ -140,6 +140,12 @@ def _methods(run: Run) -> list[str]:
 
 def _answer(run: Run) -> list[str]:
     lines = ["", f"result     {answer(run)}"]
+    for gap in errors_after_gaps(run):
+        if gap.max_m is not None:
+            lines.append(
+                f"           from the gap at {gap.start_s:.1f} s to the next stop: "
+                f"{metres(gap.max_m)} at most"
+            )
     if run.errors is not None and run.errors.states.sigma_pos is not None:
         sigma = run.errors.states.sigma_pos[-1, :2]
         expected = float(radius_95(sigma))

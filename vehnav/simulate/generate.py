@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, replace, replace
 from typing import Final, Literal
 
 import numpy as np
@@ -72,7 +72,7 @@ class SimulatedLog:
         """The recording, as a reader would deliver it (axes right-forward-up)."""
         return Log(
             path=f"simulate:{self.scenario}",
-            imu=self.imu,
+            imu=replace(self.imu, axes="RFU"),
             gnss=self.gnss,
             speed=self.speed,
             findings=self.findings,
