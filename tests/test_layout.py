@@ -15,7 +15,7 @@ LONGEST_MODULE = 400
 LONGEST_FUNCTION = 60
 PHYSICS = {
     "strapdown", "aiding", "stops", "alignment", "corrections", "mounting", "rest", "earth",
-    "rotation", "legs", "classic", "offline", "expected",
+    "rotation", "legs", "classic", "offline", "expected", "clues", "mounting_auto", "units_auto",
 }  # fmt: skip
 JUDGED = PHYSICS - {"earth", "rotation"}
 """What the simulator judges, and therefore does not use."""

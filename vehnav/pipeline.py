@@ -10,12 +10,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from itertools import pairwise
 from typing import Final
 
 import numpy as np
 import numpy.typing as npt
 
+from vehnav.aided import judge_aided, run_aided
 from vehnav.classic import (
     Corrections,
     Drive,
@@ -29,10 +29,12 @@ from vehnav.config import Config
 from vehnav.earth import ELLIPSOIDS
 from vehnav.errors import ConfigError, Finding, LogError, VehnavError
 from vehnav.evaluation import Errors, compare
+from vehnav.gps_axes import gps_between, with_axes
 from vehnav.legs import LegNoise
 from vehnav.logs.log import Gnss, Log
 from vehnav.offline import run_stops
-from vehnav.prepare import Samples, hopeless_gaps, prepare_samples, usable_imu
+from vehnav.orientation import Declared, Orientation
+from vehnav.prepare import Samples, prepare_samples, usable_imu
 from vehnav.start import Alignment, Given, GpsUse, find_start
 from vehnav.stops import (
     RMS_RULE,
@@ -102,8 +104,8 @@ class Run:
     ----------
     log : Log
     config : Config
-    axes : str
-        Letters in force.
+    orientation : Orientation
+        Axes, mounting and units in force, with the evidence.
     trajectory : Trajectory
     stops : list of Stop
     records : list of StopRecord
@@ -125,7 +127,7 @@ class Run:
 
     log: Log
     config: Config
-    axes: str
+    orientation: Orientation
     trajectory: Trajectory
     stops: list[Stop]
     records: list[StopRecord]
@@ -137,6 +139,11 @@ class Run:
     variants: Mapping[str, Trajectory]
     noise: LegNoise | None
     findings: tuple[Finding, ...]
+
+    @property
+    def axes(self) -> str:
+        """Letters of the gyro in force."""
+        return self.orientation.axes
 
     @property
     def start_ns(self) -> int:
@@ -182,6 +189,7 @@ def run(log: Log, config: Config = DEFAULTS) -> Run:
     start, alignment, gps, sigmas, start_findings = find_start(
         drive, samples, gnss, _given(config), corrections, solve
     )
+    gps = with_axes(gps, samples, gnss)
     outcome = _solve(drive, start, corrections, noise, sigmas)
     trajectory = _trajectory(outcome, samples, stops)
     variants = _variants(drive, start, noise, sigmas, samples, config, outcome)
@@ -191,7 +199,7 @@ def run(log: Log, config: Config = DEFAULTS) -> Run:
     findings += stop_findings(stops, outcome.records, samples.t_ns)
     findings += [] if errors is None else list(errors.findings)
     return Run(
-        log, config, samples.axes, trajectory, stops, outcome.records, alignment, gps,
+        log, config, samples.orientation, trajectory, stops, outcome.records, alignment, gps,
         errors, before, judged, variants, noise, tuple(findings),
     )  # fmt: skip
 
@@ -204,27 +212,9 @@ def _run_filter(drive: Drive, log: Log, config: Config, samples: Samples) -> Run
     findings = [*log.findings, *samples.findings, *aided.findings]
     findings += [] if errors is None else list(errors.findings)
     return Run(
-        log, config, samples.axes, trajectory, drive.stops, aided.outcome.records,
+        log, config, samples.orientation, trajectory, drive.stops, aided.outcome.records,
         aided.alignment, aided.gps, errors, None, {}, {}, None, tuple(findings),
     )  # fmt: skip
-
-
-def split_log(log: Log) -> list[Log]:
-    """The parts of a log between holes of over 10 s in the IMU, as logs (``--split``)."""
-    if log.imu is None:
-        return [log]
-    edges = [0, *(hopeless_gaps(log.imu.t_ns) + 1), log.imu.t_ns.size]
-    parts = []
-    for a, b in pairwise(edges):
-        inside = slice(int(a), int(b))
-        imu = replace(
-            log.imu,
-            t_ns=log.imu.t_ns[inside],
-            gyro=log.imu.gyro[inside],
-            accel=log.imu.accel[inside],
-        )
-        parts.append(replace(log, imu=imu))
-    return parts
 
 
 def corrections_of(config: Config) -> Corrections:
@@ -282,15 +272,15 @@ def _samples(log: Log, config: Config) -> Samples:
         start_ns=stamp(config.start),
         end_ns=stamp(config.end),
     )
-    roll, pitch, yaw = (x * DEG for x in config.mount)
     return prepare_samples(
         imu,
         path=log.path,
         start_ns=log.start_ns,
-        axes=None if config.axes in (None, "auto") else config.axes,
-        accel_axes=config.accel_axes,
-        mount=(roll, pitch, yaw),
+        declared=Declared.of_degrees(config.axes, config.accel_axes, config.mount),
         max_gap=config.max_gap,
+        rule=stop_rule(config),
+        gps=gps_between(None if config.gps == "none" else log.gnss, log.start_ns),
+        gps_seconds=config.gps_start_seconds,
     )
 
 

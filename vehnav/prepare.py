@@ -4,15 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
 
+from vehnav.clues import GpsBetween
 from vehnav.errors import Finding, LogError
-from vehnav.logs.log import MIN_IMU_RATE_HZ, Imu
-from vehnav.mounting import gravity_contradiction, sensor_to_body
-from vehnav.stops import StopRule, find_stops
+from vehnav.logs.log import MIN_IMU_RATE_HZ, Imu, Log
+from vehnav.orientation import Declared, Orientation, in_si, orient
+from vehnav.stops import StopRule
 from vehnav.strapdown.increments import (
     Increments,
     gap_steps,
@@ -42,8 +44,8 @@ class Samples:
         rad/s and m/s2 (mean rates over the step where the log has increments).
     increments : Increments
         Over the n-1 steps.
-    axes : str
-        Letters in force.
+    orientation : Orientation
+        Axes, mounting and units, with the evidence.
     findings : tuple of Finding
     """
 
@@ -52,7 +54,7 @@ class Samples:
     omega: Array
     f: Array
     increments: Increments
-    axes: str
+    orientation: Orientation
     findings: tuple[Finding, ...]
 
 
@@ -98,12 +100,13 @@ def prepare_samples(
     *,
     path: str,
     start_ns: int,
-    axes: str | None,
-    accel_axes: str | None,
-    mount: tuple[float, float, float],
+    declared: Declared,
     max_gap: float,
+    rule: StopRule,
+    gps: GpsBetween | None = None,
+    gps_seconds: float = 60.0,
 ) -> Samples:
-    """Turn the samples into the body, integrate them over their steps, name the gaps.
+    """Turn the samples into the body in SI, integrate them over their steps, name the gaps.
 
     Parameters
     ----------
@@ -112,30 +115,34 @@ def prepare_samples(
         For messages.
     start_ns : int
         Where seconds count from.
-    axes, accel_axes : str or None
-        Letters; None: as the format declares, checked against gravity.
-    mount : (roll, pitch, yaw), rad
+    declared : Declared
+        What the user says of axes and mounting; the rest is established from the physics.
     max_gap : float
         s
+    rule : StopRule
+        Of the stops that the evidence rests on.
+    gps : callable or None
+        Velocity by GPS between two instants, for the evidence; None: not to be used.
+    gps_seconds : float
+        s after the first departure that GPS may show before it is asked for more.
 
     Raises
     ------
     LogError
-        Gravity contradicts the axes that the format declares, or over 10 s of IMU are missing.
+        Gravity is missing; it contradicts the axes that the format declares and the drive does not
+        show the true ones; or over 10 s of IMU are missing.
     """
     t: Array = np.asarray((imu.t_ns - start_ns) * NS, dtype=np.float64)
-    letters = axes or imu.axes
+    gaps = _gap_findings(imu.t_ns, t, path, max_gap)
+    imu, units, findings = in_si(imu, t, path=path, gps=gps)
     dt = np.diff(t, prepend=t[0] - imu.median_dt)[:, None]
     as_rates = imu.sampling == "rates"
     gyro, accel = (imu.gyro, imu.accel) if as_rates else (imu.gyro / dt, imu.accel / dt)
-    contradiction = gravity_contradiction(_gravity(t, gyro, accel), accel_axes or letters)
-    findings: list[Finding] = []
-    if contradiction is not None:
-        if axes is None:
-            raise LogError(f"{path}: {contradiction}. Set --axes (none was given)")
-        findings.append(Finding("axes-contradiction", "warning", contradiction))
-    c_gyro, c_accel = sensor_to_body(letters, accel_axes=accel_axes, mount=mount)
-    findings += _gap_findings(imu.t_ns, t, path, max_gap)
+    orientation = orient(
+        imu, t, gyro, accel, declared,
+        path=path, units=units, rule=rule, gps=gps, gps_seconds=gps_seconds,
+    )  # fmt: skip
+    c_gyro, c_accel = orientation.matrices()
     omega, f = gyro @ c_gyro.T, accel @ c_accel.T
     if as_rates:
         increments = increments_from_rates(t, omega, f, max_gap=max_gap)
@@ -143,7 +150,8 @@ def prepare_samples(
         increments = increments_from_log(
             t, imu.gyro @ c_gyro.T, imu.accel @ c_accel.T, max_gap=max_gap
         )
-    return Samples(imu.t_ns, t, omega, f, increments, letters, tuple(findings))
+    everything = (*findings, *orientation.findings, *gaps)
+    return Samples(imu.t_ns, t, omega, f, increments, orientation, everything)
 
 
 def hopeless_gaps(t_ns: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
@@ -151,13 +159,22 @@ def hopeless_gaps(t_ns: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
     return np.flatnonzero(np.diff(t_ns) * NS > HOPELESS_GAP)
 
 
-def _gravity(t: Array, gyro: Array, accel: Array) -> Array:
-    """(3,) mean specific force over the stops, else over the log, on the sensor axes."""
-    stops = find_stops(t, gyro, accel, StopRule())
-    if not stops:
-        return np.asarray(accel.mean(axis=0))
-    longest = max(stops, key=lambda stop: stop.duration)
-    return np.asarray(accel[longest.first : longest.last + 1].mean(axis=0))
+def split_log(log: Log) -> list[Log]:
+    """The parts of a log between holes of over 10 s in the IMU, as logs (``--split``)."""
+    if log.imu is None:
+        return [log]
+    edges = [0, *(hopeless_gaps(log.imu.t_ns) + 1), log.imu.t_ns.size]
+    parts = []
+    for a, b in pairwise(edges):
+        inside = slice(int(a), int(b))
+        imu = replace(
+            log.imu,
+            t_ns=log.imu.t_ns[inside],
+            gyro=log.imu.gyro[inside],
+            accel=log.imu.accel[inside],
+        )
+        parts.append(replace(log, imu=imu))
+    return parts
 
 
 def _gap_findings(

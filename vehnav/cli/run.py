@@ -215,7 +215,7 @@ def _results(
     """The runs of a log with the folder of each: one, or one per part with ``--split``."""
     from vehnav.logs.read import read_log
     from vehnav.pipeline import run as run_log
-    from vehnav.pipeline import split_log
+    from vehnav.prepare import split_log
 
     with progress(f"{path}: reading", quiet=quiet):
         log = read_log(path, read_options)
