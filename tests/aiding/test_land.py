@@ -1,0 +1,214 @@
+"""The land filter on simulated drives, whose truth is known, and its parts (spec B, T27-T30)."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from vehnav.aiding import measurements
+from vehnav.aiding.blocks import ROW, take_off
+from vehnav.aiding.gaps import bridge_gaps
+from vehnav.aiding.vehicle import SIZE
+from vehnav.config import Config
+from vehnav.earth import WGS84, position_difference
+from vehnav.logs.log import Speed
+from vehnav.pipeline import run
+from vehnav.rotation import c_from_rotvec, c_nb_from_angles
+from vehnav.simulate import GnssModel, WheelModel, simulate
+from vehnav.strapdown.increments import increments_from_rates
+from vehnav.strapdown.wander import c_we_from_geodetic, mat3
+from vehnav.units import DEG, NS
+
+TOWN = "city,duration=300,seed=4,first_stop=30,stop_every=80"
+
+
+@pytest.fixture(scope="module")
+def town():
+    return simulate(
+        TOWN, sensor="mems-industrial", seed=3, rate_hz=100.0, gnss=GnssModel(), wheel=WheelModel()
+    )
+
+
+def error_of(found, simulated):
+    """(n,) horizontal m between a run and the truth at its instants."""
+    t = found.trajectory.t_ns
+    k = np.searchsorted(simulated.truth.t_ns, t)
+    d = position_difference(
+        found.trajectory.lat, found.trajectory.lon, simulated.truth.lat[k], simulated.truth.lon[k]
+    )
+    return np.hypot(d[:, 0], d[:, 1])
+
+
+@pytest.fixture(scope="module")
+def solutions(town):
+    log = replace(town.log(), speed=None)
+    return {
+        "stops": run(log, Config()),
+        "filter": run(log, Config(method="filter")),
+        "smooth": run(log, Config(method="smooth")),
+        "wheel": run(town.log(), Config(method="smooth")),
+        "aided": run(log, Config(method="smooth", gps="aid", outage=("120:180",))),
+    }
+
+
+def test_each_aid_makes_it_better(town, solutions):
+    worst = {name: float(np.max(error_of(found, town))) for name, found in solutions.items()}
+    assert worst["filter"] < 0.6 * worst["stops"]  # no side slip, forward only
+    assert worst["smooth"] <= worst["filter"] * 1.05
+    assert worst["wheel"] < worst["smooth"]
+    assert worst["aided"] < 3.0  # fixes of some metres around a minute without
+
+
+def test_sigmas_are_honest_and_the_smoother_is_surer(town, solutions):
+    f, s = solutions["filter"].trajectory, solutions["smooth"].trajectory
+    assert np.all(s.sigma_pos[:, :2] <= f.sigma_pos[:, :2] * 1.001 + 1e-6)
+    assert np.all(s.sigma_heading <= f.sigma_heading * 1.001 + 1e-9)
+    e = error_of(solutions["smooth"], town)
+    radius = np.hypot(s.sigma_pos[:, 0], s.sigma_pos[:, 1])
+    assert 0.2 < np.sqrt(np.mean(e**2) / np.mean(radius**2)) < 1.5
+
+
+def test_velocity_is_zero_at_stops(solutions):
+    for name in ("filter", "smooth"):
+        trajectory = solutions[name].trajectory
+        inside = trajectory.stopped.copy()
+        inside[1:-1] &= trajectory.stopped[:-2] & trajectory.stopped[2:]
+        assert np.sqrt(np.mean(trajectory.v_n[inside] ** 2)) < 0.1
+
+
+def test_outage_is_reported(solutions):
+    rows = solutions["aided"].errors.outages
+    assert len(rows) == 1
+    assert rows[0].length_s == pytest.approx(60.0)
+    assert rows[0].max_m is not None
+    codes = {finding.code for finding in solutions["aided"].findings}
+    assert {"filter-tuning", "filter-innovations"} <= codes
+
+
+def test_starts_rolling_without_any_stop():
+    """No stop anywhere: course, level and gyro bias from GPS under way."""
+    simulated = simulate("motorway,duration=240,seed=5,first_stop=0,stop_every=10000",
+                         sensor="mems-industrial", seed=2)  # fmt: skip
+    log = simulated.log()
+    part = slice(5000, None)
+    imu = replace(log.imu, t_ns=log.imu.t_ns[part], gyro=log.imu.gyro[part],
+                  accel=log.imu.accel[part])  # fmt: skip
+    found = run(replace(log, imu=imu), Config(method="smooth", end=150.0))
+    assert found.stops == []
+    e = error_of(found, simulated)
+    assert np.max(e) < 0.02 * found.trajectory.path_length()
+
+
+def test_odometer_scale_is_found(town):  # T27: kappa = 2 %
+    log = town.log()
+    speed = Speed(log.speed.t_ns, log.speed.speed * 1.02 / 1.004, "/wheel")
+    found = run(replace(log, speed=speed), Config(method="smooth", gps="aid"))
+    e = error_of(found, town)
+    assert np.max(e) < 3.0
+    exact = run(log, Config(method="smooth", gps="aid"))
+    assert abs(np.max(e) - np.max(error_of(exact, town))) < 0.2
+
+
+def test_speed_and_constraint_see_no_attitude():  # T28
+    h, par = np.zeros(SIZE), np.zeros(SIZE - 9)
+    c_wb, v = mat3(c_nb_from_angles(0.3, 0.02, -0.01)), (10.0, 4.0, 0.2)
+    rate = (0.01, 0.02, 0.2)
+    for write in (
+        lambda: measurements.no_side_slip(h, v, c_wb, rate, par),
+        lambda: measurements.no_lift(h, v, c_wb, par),
+        lambda: measurements.odometer(h, v, c_wb, 10.0, par),
+        lambda: measurements.zero_velocity(h, 0, v),
+    ):
+        write()
+        assert not np.any(h[6:9])
+        assert np.any(h[3:6])
+
+
+@pytest.mark.parametrize("size", [1.0, 0.5])
+def test_feedback_restores_the_state(size):  # T29: 10 m, 0.1 m/s, 1e-4 rad
+    x = size * np.array([10.0, -7.0, 5.0, 0.1, -0.05, 0.02, 1e-4, -1e-4, 1e-4])
+    row = np.zeros(ROW)
+    row[:9] = c_we_from_geodetic(0.9, 0.2, 0.4).ravel()
+    row[9], row[10:13] = 50.0, (12.0, -3.0, 0.1)
+    row[13:] = c_nb_from_angles(0.3, 0.02, 0.01).ravel()
+    true = row.copy()
+    take_off(true, x, WGS84)
+    # by the definitions of error_model.py: what the true row must be
+    y = c_we_from_geodetic(0.9, 0.2, 0.4) @ (_ecef(row) - _ecef(true))
+    assert np.allclose(y, x[:3], atol=1e-3 * np.abs(x[:3]).max())
+    turn = c_from_rotvec(x[6:9])
+    assert np.allclose(true[13:].reshape(3, 3), turn @ row[13:].reshape(3, 3), atol=1e-12)
+    seen = row[10:13] - row[13:].reshape(3, 3) @ true[13:].reshape(3, 3).T @ true[10:13]
+    assert np.allclose(seen, x[3:6], atol=1e-3 * np.abs(x[3:6]).max())
+
+
+def _ecef(row):
+    return np.array(measurements.ecef_of(mat3(row[:9].reshape(3, 3)), row[9], WGS84))
+
+
+def test_measurement_rows_by_differences():
+    """Rows of the speed measurements against moving the true state by the feedback law."""
+    row, par = np.zeros(ROW), np.zeros(SIZE - 9)
+    row[:9] = c_we_from_geodetic(0.8, 0.1).ravel()
+    row[10:13] = (11.0, 3.0, 0.3)
+    row[13:] = c_nb_from_angles(1.2, 0.03, -0.02).ravel()
+    par[6:12] = (0.01, 0.02, -0.01, 1.2, 0.0, 0.004)
+    rate = (0.02, 0.01, 0.3)
+    kinds = (
+        lambda h, v, c, p: measurements.no_side_slip(h, v, c, rate, p),
+        lambda h, v, c, p: measurements.no_lift(h, v, c, p),
+        lambda h, v, c, p: measurements.odometer(h, v, c, 11.0, p),
+    )
+    for kind in kinds:
+        h, scratch = np.zeros(SIZE), np.zeros(SIZE)
+        z = kind(h, tuple(row[10:13]), mat3(row[13:].reshape(3, 3)), par)
+        for j in [*range(3, 9), *range(15, 19), 20, 21, 22]:
+            step = 1e-5
+            x = np.zeros(SIZE)
+            x[j] = step
+            moved, other = row.copy(), par.copy()
+            take_off(moved, x, WGS84)
+            other -= x[9:]
+            change = z - kind(scratch, tuple(moved[10:13]), mat3(moved[13:].reshape(3, 3)), other)
+            assert change / step == pytest.approx(h[j], abs=2e-3), j
+
+
+def test_zero_velocity_in_motion_is_rejected(town):  # T30
+    """A stop that is none (15 m/s): the updates are gated, and the run says so."""
+    log = replace(town.log(), speed=None)
+    good = run(log, Config(method="filter"))
+    moving = np.flatnonzero(~good.trajectory.stopped)
+    assert moving.size
+    text = [f.text for f in good.findings if f.text.startswith("zupt")]
+    assert text
+    assert " 0 rejected" in text[0]
+    h, x, p = np.zeros(SIZE), np.zeros(SIZE), 1e-4 * np.eye(SIZE)
+    from vehnav.aiding.kalman import update
+
+    z = measurements.zero_velocity(h, 0, (15.0, 0.0, 0.0))
+    _, s, _ = update(x, p, h, z, 0.04, 2.0, 30.0, np.zeros(SIZE))
+    assert s == 0.0
+    assert not np.any(x)
+
+
+def test_gap_in_a_turn_is_bridged(town):
+    """1.2 s cut out of a turn: the heading change is met, the sigma covers what is left."""
+    t = (town.ideal.t_ns - town.ideal.t_ns[0]) * NS
+    rate = town.ideal.gyro[:, 2]
+    k = int(np.argmax(np.abs(np.gradient(rate, t))[200:-200])) + 200
+    kept = (t < t[k] - 0.6) | (t > t[k] + 0.6)
+    whole = increments_from_rates(t, town.ideal.gyro, town.ideal.accel, max_gap=0.5)
+    cut = increments_from_rates(t[kept], town.ideal.gyro[kept], town.ideal.accel[kept], max_gap=0.5)
+    bridged, sigmas = bridge_gaps(cut, town.ideal.gyro[kept], town.ideal.accel[kept])
+    gap = int(np.argmax(cut.dt))
+    assert cut.coast[gap]
+    assert not bridged.coast[gap]
+    first, last = np.searchsorted(t, [cut.t[gap], cut.t[gap + 1]])
+    true = whole.dtheta[first:last, 2].sum()
+    error = abs(bridged.dtheta[gap, 2] - true)
+    assert error < abs(cut.dtheta[gap, 2] - true)
+    assert error < 3.0 * sigmas.attitude[gap, 2]
+    assert np.count_nonzero(sigmas.velocity) == 1
+    assert sigmas.attitude[gap, 2] < 10.0 * DEG
