@@ -283,14 +283,17 @@ def _at_lag(when: Array, mean: Array, rest: Rest, motion: GpsMotion, lag: float)
     (v0, _, v1), speed = (x[ok] for x in v), speed[:, ok]
     turn = np.arctan2(v0[:, 0] * v1[:, 1] - v0[:, 1] * v1[:, 0], np.sum(v0 * v1, axis=1)) / 2.0
     w = mean[ok, :3] - rest.rate
+    swing = turn
+    if not rest.stops:  # the bias is a guess then: only what varies counts
+        w, swing = w - w.mean(axis=0), turn - turn.mean()
     about_up = w @ rest.up
-    power = float(turn @ turn)
-    parity = float(about_up @ turn) / max(float(np.linalg.norm(about_up)) * power**0.5, 1e-12)
+    power = float(swing @ swing)
+    parity = float(about_up @ swing) / max(float(np.linalg.norm(about_up)) * power**0.5, 1e-12)
     along = (speed[2] - speed[0]) / 2.0
     forward, fit, mirrored = _turned(mean[ok, 3:], rest, along + 1j * speed[1] * turn)
     return GpsClue(
         parity=parity,
-        gyro_slope=turn @ w / max(power, 1e-12),
+        gyro_slope=swing @ w / max(power, 1e-12),
         forward=forward,
         fit=fit,
         mirrored=mirrored,

@@ -6,7 +6,7 @@ such constant; vehicles turn slowly, and the force in turns is the speed times t
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final
 
 import numpy as np
@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from vehnav.clues import GpsBetween, Rest, by_gps, turns
 from vehnav.rest import TimeIntegral, running_deviation, running_mean
-from vehnav.stops import FORCE_THRESHOLD, quiet_bias
+from vehnav.stops import FORCE_THRESHOLD
 from vehnav.units import ACCEL_UNITS, DEG, GYRO_UNITS, STANDARD_GRAVITY
 
 Array = npt.NDArray[np.float64]
@@ -115,7 +115,8 @@ def establish_units(t: Array, gyro: Array, accel: Array, *, gps: GpsBetween | No
         Velocity by GPS between two instants; asked for the first two minutes, and only where rate
         and turns leave the gyro open.
     """
-    force = quiet_force(t, accel)
+    rest = quietest(t, gyro, accel)
+    force = float(np.linalg.norm(rest.force))
     mean = np.linalg.norm(running_mean(t, accel, 0.25), axis=1)
     steady = float(np.mean(np.abs(mean / max(force, 1e-12) - 1.0) < STEADY)) >= STEADY_SHARE
     dt = float(np.median(np.diff(t)))
@@ -133,42 +134,44 @@ def establish_units(t: Array, gyro: Array, accel: Array, *, gps: GpsBetween | No
     if increments:
         return Units("rad/s", "m/s2", True, force, None, True)
     gravity = accel_unit != "m/s2" or force >= (NO_GRAVITY if steady else HALF_GRAVITY)
-    accel_si = accel * ACCEL_UNITS[accel_unit]
-    unit, rate, doubt, until = _gyro_unit(t, gyro, accel_si, gps)
+    scale = ACCEL_UNITS[accel_unit]
+    rest = replace(rest, force=rest.force * scale)
+    unit, rate, doubt, until = _gyro_unit(t, gyro, accel * scale, rest, gps)
     if accel_unit == "m/s2" and abs(force / STANDARD_GRAVITY - 1.0) > TOLERANCE:
         doubt = f"the accelerometer reads {force:.3g} at rest, which is no unit of gravity"
     return Units(unit, accel_unit, False, force, rate, gravity, doubt, until)
 
 
-def quiet_force(t: Array, accel: Array) -> float:
-    """|mean force| of the quietest 5 % of 2 s windows (median of them): no unit need be known."""
+def quietest(t: Array, gyro: Array, accel: Array) -> Rest:
+    """Force and rate in the quietest 5 % of 2 s windows: no unit need be known.
+
+    Quiet is where the force varies least; the medians over those windows of their means.
+    """
     edges = np.arange(t[0], t[-1] - 2.0, 2.0)
     if edges.size == 0:
-        return float(np.linalg.norm(accel.mean(axis=0)))
+        return Rest(np.asarray(accel.mean(axis=0)), np.asarray(gyro.mean(axis=0)), 0, 0.0)
     centred = accel - accel.mean(axis=0)
     square = np.sum(centred**2, axis=1)[:, None]
-    means = TimeIntegral(t, np.concatenate([accel, centred, square], axis=1)).mean(
-        edges, edges + 2.0
-    )
-    variance = means[:, 6] - np.sum(means[:, 3:6] ** 2, axis=1)
-    quietest = np.argsort(variance, kind="stable")[: max(1, edges.size // 20)]
-    return float(np.median(np.linalg.norm(means[quietest, :3], axis=1)))
+    columns = np.concatenate([accel, gyro, centred, square], axis=1)
+    means = TimeIntegral(t, columns).mean(edges, edges + 2.0)
+    variance = means[:, 9] - np.sum(means[:, 6:9] ** 2, axis=1)
+    calm = np.argsort(variance, kind="stable")[: max(1, edges.size // 20)]
+    force, rate = np.median(means[calm, :3], axis=0), np.median(means[calm, 3:6], axis=0)
+    return Rest(np.asarray(force), np.asarray(rate), 0, 0.0)
 
 
 def _gyro_unit(
-    t: Array, gyro: Array, f: Array, gps: GpsBetween | None
+    t: Array, gyro: Array, f: Array, rest: Rest, gps: GpsBetween | None
 ) -> tuple[str, float | None, str, float | None]:
     """(unit, median rate in motion, doubt, last instant of GPS that decided)."""
     moving = running_deviation(t, running_mean(t, f, 0.25), 2.0) > FORCE_THRESHOLD
     if np.mean(moving) * (t[-1] - t[0]) < 5.0:
         return "rad/s", None, "", None
-    bias = quiet_bias(t, gyro)
-    rate = float(np.median(np.linalg.norm(running_mean(t, gyro, 0.25)[moving] - bias, axis=1)))
+    rate = float(np.median(np.linalg.norm(running_mean(t, gyro, 0.25)[moving] - rest.rate, axis=1)))
     if rate < SURELY_RADIANS:
         return "rad/s", rate, "", None
     if rate > SURELY_DEGREES:
         return "deg/s", rate, "", None
-    rest = Rest(np.asarray(f.mean(axis=0)), bias, 0, 0.0)
     turned = turns(t, gyro, f, rest, [])
     if turned is not None and turned.share >= TURN_SHARE:
         if turned.speed > TURN_SPEEDS[1]:
