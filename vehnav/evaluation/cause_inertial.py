@@ -3,6 +3,9 @@
 The rows are those of :mod:`vehnav.aiding.error_model` (003 eq. 27 in East-North-Up, height held).
 A velocity reset and a levelling are linear maps of the errors (spec B 1.3, step 4): at a stop the
 velocity error vanishes, and the tilt becomes what the accelerometer error looks like.
+
+A gyro triad turned against the accelerometers by an angle cannot be told from an accelerometer bias
+of g times that angle (1 mrad: 1 mg): the attitude follows the gyros, the force the others.
 """
 
 from __future__ import annotations
@@ -27,6 +30,7 @@ from vehnav.evaluation.cause_models import (
     ACCEL_PRIOR,
     HEADING_PRIOR,
     SCALE_PRIOR,
+    SHEAR_PRIOR,
     TILT_PRIOR,
     Columns,
     Design,
@@ -63,6 +67,8 @@ class _Layout:
     scale: slice
     accel: slice
     accel_scale: slice
+    accel_right: slice
+    shear: slice
     level: slice
     gyro_drift: slice
     accel_drift: slice
@@ -119,6 +125,8 @@ def _columns(
         for axis in AXES[:2]
     ]
     accel_scale = add("accel-scale", "accelerometer scale (forward)", "%", 0.01, SCALE_PRIOR)
+    right = add("accel-scale-right", "accelerometer scale (right)", "%", 0.01, SCALE_PRIOR)
+    shear = add("accel-shear", "angle between the accelerometers", "deg", DEG, SHEAR_PRIOR)
     levels = motion.stops if levelling else min(motion.stops, 1)
     sigma = [noise.level] * (2 * levels) if levels else [TILT_PRIOR] * 2
     name = "levels at the stops" if levels > 1 else "level at the start"
@@ -131,7 +139,8 @@ def _columns(
                       np.kron(one, np.eye(2)))  # fmt: skip
     return columns, _Layout(
         start, delay, heading, slice(gyro[0].start, gyro[2].stop), scale,
-        slice(accel[0].start, accel[1].stop), accel_scale, level, gyro_drift, accel_drift,
+        slice(accel[0].start, accel[1].stop), accel_scale, right, shear,
+        level, gyro_drift, accel_drift,
     )  # fmt: skip
 
 
@@ -222,13 +231,13 @@ def _steps(motion: Motion) -> tuple[Array, Array]:
     return phi, drive + 0.5 * now @ drive
 
 
-def _forward_force(motion: Motion) -> Array:
-    """(g-1,) m/s2: mean specific force along the vehicle over each step."""
+def _forces(motion: Motion) -> Array:
+    """(g-1, 2) m/s2: mean specific force right and forward over each step."""
     dt = np.diff(motion.t)[:, None]
     f_n = np.diff(motion.v_n, axis=0) / dt
     f_n[:, 2] += _gravity(motion)
-    forward = motion.c_nb[1:, :, 1] + motion.c_nb[:-1, :, 1]
-    return np.asarray(np.sum(0.5 * forward * f_n, axis=1))
+    axes = 0.5 * (motion.c_nb[1:, :, :2] + motion.c_nb[:-1, :, :2])
+    return np.asarray(np.einsum("kij,ki->kj", axes, f_n))
 
 
 def _propagate(
@@ -244,7 +253,7 @@ def _propagate(
     """Position (g, 2, p) and attitude (g, 3, p) errors along the drive, per unit of the columns."""
     phi, drive = _steps(motion)
     turning = motion.turned()[:, 2] / np.diff(motion.t)
-    force, gravity = _forward_force(motion), _gravity(motion)
+    force, gravity = _forces(motion), _gravity(motion)
     middle = 0.5 * (motion.t[1:] + motion.t[:-1])
     piece = np.clip(np.searchsorted(edges, middle, side="right") - 1, 0, edges.size - 2)
     moved = np.zeros((motion.t.size, 2, state.shape[1]))
@@ -252,7 +261,8 @@ def _propagate(
     turn[0] = state[ATTITUDE]
     for k in range(motion.t.size - 1):
         now = held.copy()
-        now[1, at.accel_scale] = force[k]
+        now[1, at.accel_scale], now[0, at.accel_right] = force[k, 1], force[k, 0]
+        now[0, at.shear], now[1, at.shear] = force[k, 1], force[k, 0]
         now[5, at.scale] = turning[k]
         first = at.gyro_drift.start + 3 * int(piece[k])
         now[3:6, first : first + 3] += np.eye(3)

@@ -1,10 +1,10 @@
 """What the sources of error do to the position: columns of the models that causes are fitted with.
 
 A column is the position error (estimate minus truth, east and north, m) that one unit of a source
-makes at every judged instant. Two models: :func:`vehnav.evaluation.cause_inertial.inertial_design`
-for the methods that integrate on through (free, levelling, reset, as published), and
-:func:`heading_and_distance` here for the offline solution, whose velocity and level are tied down
-at both ends of every leg: what such ties cannot see is left.
+makes at every judged instant. Two models:
+:func:`vehnav.evaluation.cause_inertial.inertial_design` for the methods that integrate on through
+(free, levelling, reset, as published), :func:`vehnav.evaluation.cause_offline.offline_design` for
+the default, whose velocity and level are tied down at both ends of every leg.
 """
 
 from __future__ import annotations
@@ -42,6 +42,7 @@ DRIFT_PRIOR: Final = 10.0 * DEG_PER_HOUR
 ACCEL_PRIOR: Final = 5.0 * MILLI_G
 SCALE_PRIOR: Final = 0.01
 DELAY_PRIOR: Final = 0.5
+SHEAR_PRIOR: Final = 0.2 * DEG
 TILT_PRIOR: Final = 1.0 * DEG
 
 
@@ -241,78 +242,3 @@ def at_instants(t: Array, grid: Array, values: Array) -> Array:
     k = np.clip(np.searchsorted(grid, t, side="right") - 1, 0, grid.size - 2)
     s = ((t - grid[k]) / (grid[k + 1] - grid[k])).reshape((-1,) + (1,) * (values.ndim - 1))
     return np.asarray((1.0 - s) * values[k] + s * values[k + 1])
-
-
-# ---- the offline solution ----------------------------------------------------------------------
-
-
-def heading_and_distance(
-    track: Trajectory,
-    t_ns: TimeArray,
-    *,
-    noise: LegNoise,
-    position_sigma: float,
-) -> Design:
-    """What stops cannot see: heading, what turns it under way, the scale of the distance.
-
-    A heading error beta (clockwise) moves the position by ``dr_E = V_N beta``, ``dr_N = -V_E
-    beta`` a second; a gyro error about up changes it by ``d beta = -d omega_z``. A scale error of
-    the forward accelerometer stretches the way, for velocities that are zero at both ends. The rest
-    of each leg, between a velocity and a level known at both ends, is a hump of known size
-    (:func:`hump_sigma`) that stays as a shift.
-
-    Parameters
-    ----------
-    track : Trajectory
-    t_ns : (m,) int64
-        Judged instants inside the track.
-    noise : LegNoise
-    position_sigma : float
-        m, of the start on each axis.
-    """
-    motion = motion_of(track)
-    legs, t = motion.legs(), motion.t
-    columns = Columns()
-    start, delay = start_and_delay(columns, position_sigma)
-    heading = columns.add("heading", "initial heading", "deg", DEG, HEADING_PRIOR)
-    scale = columns.add("gyro-scale-up", "gyro scale (up)", "%", 0.01, SCALE_PRIOR)
-    bias = columns.add("gyro-bias-up", "gyro bias under way (up)", "deg/h", DEG_PER_HOUR,
-                       DRIFT_PRIOR)  # fmt: skip
-    distance = columns.add("accel-scale", "distance scale (accelerometer forward)", "%", 0.01,
-                           SCALE_PRIOR)  # fmt: skip
-    drift = columns.add("heading-drift", "gyro noise and drift on the legs", "deg", DEG,
-                        [noise.gyro_white * np.sqrt(t[b] - t[a]) for a, b in legs])  # fmt: skip
-    hump = columns.add("leg", "noise of the accelerometers and levels on the legs", "m", 1.0,
-                       np.repeat([hump_sigma(t[b] - t[a], noise) for a, b in legs], 2))  # fmt: skip
-    beta = np.zeros((t.size, columns.count))
-    beta[:, heading] = 1.0
-    beta[1:, scale] = -np.cumsum(motion.turned()[:, 2:], axis=0)
-    moving = np.diff(t) * ((motion.stop[1:] < 0) | (motion.stop[:-1] < 0))
-    beta[1:, bias] = -np.cumsum(moving)[:, None]
-    for k, (a, b) in enumerate(legs):
-        beta[:, drift.start + k] = np.clip((t - t[a]) / (t[b] - t[a]), 0.0, 1.0)
-    v_n = motion.v_n
-    rate = np.stack([v_n[:, 1, None] * beta, -v_n[:, 0, None] * beta], axis=1)
-    rate[:, :, distance] = v_n[:, :2, None]
-    moved = np.zeros_like(rate)
-    np.cumsum(0.5 * (rate[1:] + rate[:-1]) * np.diff(t)[:, None, None], axis=0, out=moved[1:])
-    for k, (a, b) in enumerate(legs):
-        s = np.clip((t - t[a]) / (t[b] - t[a]), 0.0, 1.0)
-        for axis in range(2):
-            moved[:, axis, hump.start + 2 * k + axis] = s * s * (3.0 - 2.0 * s)
-    response = at_instants(motion.seconds(t_ns), t, moved)
-    put_start_and_delay(response, start, delay, track, t_ns)
-    return Design(
-        tuple(columns.sources), response, columns.prior(),
-        np.zeros((0, 3, columns.count)), ("heading-drift", "leg"),
-    )  # fmt: skip
-
-
-def hump_sigma(duration: float, noise: LegNoise) -> float:
-    """Position, m per axis, at the end of a leg whose velocity and tilt are known at both ends.
-
-    Of the triple integral of white noise its first two integrals at the end leave the variance
-    g^2 q T^5 / 720, of the double integral the first leaves s T^3 / 12 (Gaussian conditioning).
-    """
-    gyro = (noise.gravity * noise.gyro_white) ** 2 * duration**5 / 720.0
-    return float(np.sqrt(gyro + noise.accel_white**2 * duration**3 / 12.0))

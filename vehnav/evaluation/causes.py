@@ -21,8 +21,8 @@ from vehnav.evaluation.cause_models import (
     TYPICAL_NOISE,
     Design,
     Source,
-    heading_and_distance,
 )
+from vehnav.evaluation.cause_offline import offline_design
 from vehnav.evaluation.errors import Errors
 from vehnav.legs import LegNoise
 from vehnav.trajectory import Trajectory
@@ -54,7 +54,10 @@ SEEN: Final = 0.5
 STRAINED: Final = 0.1
 INVALID: Final = 0.5
 """rad of attitude error beyond which the linear model is strained, and not valid (spec B 1.5)."""
-NOISE_SCALES: Final = (0.06, 0.12, 0.25, 0.5, 1.0, 2.0, 4.0)
+OFFLINE_FACTOR: Final = 2.0
+"""Times the formal sigmas of the offline model: over simulated drives with MEMS sensors they are
+that much too small (its legs are not all alike), while those of the inertial model fit."""
+NOISE_SCALES: Final = (0.03, 0.06, 0.12, 0.25, 0.5, 1.0, 2.0, 4.0)
 """Times the noise that the log's rest promises under way; the most probable one is taken."""
 FEWEST: Final = 10
 """Judged fixes below which nothing is fitted."""
@@ -140,6 +143,8 @@ class Causes:
     misfit : float
         Root of chi square per observation, 1 where the noise is what it was taken for; above 1
         all sigmas are already multiplied by it.
+    noise_scale : float
+        The noise of the sensors under way that the errors suggest, over the one taken from rest.
     condition : float
         Of the scaled equations: largest over smallest singular value of the single sources.
     alike : tuple of (label, label, correlation)
@@ -157,6 +162,7 @@ class Causes:
     unexplained: float = 0.0
     residual_m: float = 0.0
     misfit: float = 0.0
+    noise_scale: float = 1.0
     condition: float = 1.0
     alike: tuple[tuple[str, str, float], ...] = ()
     tilt: float = 0.0
@@ -177,6 +183,7 @@ class Causes:
             "unexplained": self.unexplained,
             "residual_m": self.residual_m,
             "misfit": self.misfit,
+            "noise_scale": self.noise_scale,
             "condition": self.condition,
             "alike": [
                 {"sources": [one, other], "correlation": rho} for one, other, rho in self.alike
@@ -236,12 +243,13 @@ def find_causes(
     known = TYPICAL_NOISE if noise is None else noise
     start = max(float(np.median(seen.sigma)), 1.0)
     if offline:
-        design = heading_and_distance(track, seen.t_ns, noise=known, position_sigma=start)
+        design = offline_design(track, seen.t_ns, noise=known, position_sigma=start)
     else:
         design = inertial_design(
             track, seen.t_ns, levelling=levelling, reset=reset, noise=known, position_sigma=start
         )
-    return _explain(Causes(method, rms, end, gps, needed=True), seen, design)
+    factor = OFFLINE_FACTOR if offline else 1.0
+    return _explain(Causes(method, rms, end, gps, needed=True), seen, design, factor)
 
 
 def _observed(errors: Errors, index: npt.NDArray[np.int64]) -> _Observed:
@@ -306,7 +314,7 @@ def _fit(reduced: Array, z: Array, outside: float, prior: Array, count: int) -> 
     return _Fit(root @ scaled, spread @ spread.T * max(misfit, 1.0) ** 2, misfit, evidence)
 
 
-def _explain(blank: Causes, seen: _Observed, design: Design) -> Causes:
+def _explain(blank: Causes, seen: _Observed, design: Design, sigma_factor: float) -> Causes:
     """The fit, and what each source has to do with the error."""
     root = _noise_root(seen)
     white = np.linalg.solve(root, np.concatenate([design.response, seen.error[:, :, None]], axis=2)
@@ -315,12 +323,12 @@ def _explain(blank: Causes, seen: _Observed, design: Design) -> Causes:
     q, reduced = np.linalg.qr(white[:, :-1])
     z = q.T @ white[:, -1]
     outside = max(float(white[:, -1] @ white[:, -1] - z @ z), 0.0)
-    fits = [
-        _fit(reduced, z, outside, design.prior_with(factor), white.shape[0])
+    fits = {
+        factor: _fit(reduced, z, outside, design.prior_with(factor), white.shape[0])
         for factor in NOISE_SCALES
-    ]
-    fit = max(fits, key=lambda found: found.evidence)
-    x, covariance = fit.x, fit.covariance
+    }
+    factor, fit = max(fits.items(), key=lambda found: found[1].evidence)
+    x, covariance = fit.x, fit.covariance * sigma_factor**2
     causes = [_cause(source, design, seen.error, x, covariance) for source in design.sources]
     left = seen.error - design.response @ x
     singles = [source for source in design.sources if source.single]
@@ -333,6 +341,7 @@ def _explain(blank: Causes, seen: _Observed, design: Design) -> Causes:
         unexplained=float(np.sum(left * seen.error) / np.sum(seen.error**2)),
         residual_m=float(np.sqrt(np.mean(np.sum(left**2, axis=1)))),
         misfit=fit.misfit,
+        noise_scale=factor,
         condition=float(size[0] / max(size[-1], 1e-12 * size[0])),
         alike=_alike(singles, covariance[np.ix_(index, index)]),
         tilt=float(np.max(np.linalg.norm(design.turn @ x, axis=1), initial=0.0)),

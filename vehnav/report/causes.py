@@ -7,10 +7,11 @@ import weakref
 from collections.abc import Mapping
 from typing import Any, Final
 
+from vehnav.choices import METHODS
 from vehnav.evaluation import Errors
 from vehnav.evaluation.cause_text import sentence
 from vehnav.evaluation.causes import Causes, find_causes
-from vehnav.pipeline import METHODS, Run
+from vehnav.pipeline import Run
 from vehnav.report.figures import own_method
 from vehnav.report.markup import esc, table
 from vehnav.trajectory import Trajectory
@@ -29,7 +30,8 @@ SHOWN: Final = 0.005
 NOTE: Final = (
     "The sources of the linear error model, fitted to the error against GPS; values are estimate "
     "minus truth, ± one sigma. Shares are of the squared error over the drive and add up to 100 %; "
-    "a negative one worked against the others. A wrong mounting yaw looks like a wrong heading."
+    "a negative one worked against the others. A wrong mounting yaw looks like a wrong heading, and a "
+    "gyro turned against the accelerometers by 1 mrad like an accelerometer bias of 1 mg."
 )
 
 

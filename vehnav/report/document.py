@@ -23,6 +23,7 @@ from vehnav.evaluation.stop_score import gps_speed, speed_inside
 from vehnav.export.atomic import atomic_path
 from vehnav.logs.log import Gnss, Log
 from vehnav.pipeline import Run
+from vehnav.report.causes import causes_tree
 from vehnav.start import Alignment
 from vehnav.units import DEG, DEG_PER_HOUR, NS
 
@@ -113,8 +114,14 @@ def _input(run: Run) -> dict[str, Any]:
         "speed": None
         if log.speed is None
         else {"source": log.speed.source, "samples": int(log.speed.t_ns.size)},
-        "axes": run.axes,
+        "axes": run.orientation.axes,
+        "accel_axes": run.orientation.accel_axes,
+        "mount_deg": [x / DEG for x in run.orientation.mount],
+        "axes_evidence": run.orientation.evidence.to_dict(),
         "units": {"gyro": "rad/s", "accel": "m/s2"},
+        "units_evidence": None
+        if run.orientation.units is None
+        else run.orientation.units.to_dict(),
         "unix_clock": log.unix_clock,
         "integrity": {"damaged": log.damaged, **dict(log.integrity)},
         "findings": finding_rows(run.findings, run.start_ns),
@@ -208,7 +215,12 @@ def _errors(run: Run) -> dict[str, Any] | None:
         return None
     methods = {name: _horizontal(errors) for name, errors in run.method_errors.items()}
     after_gaps = [row.to_dict() for row in errors_after_gaps(run)]
-    return {**run.errors.to_dict(), "methods": methods, "after_gaps": after_gaps}
+    return {
+        **run.errors.to_dict(),
+        "methods": methods,
+        "after_gaps": after_gaps,
+        "causes": causes_tree(run),
+    }
 
 
 def errors_after_gaps(run: Run) -> tuple[Outage, ...]:

@@ -5,7 +5,9 @@ from __future__ import annotations
 import math
 from typing import Final
 
+from vehnav.orientation import Orientation
 from vehnav.pipeline import Run
+from vehnav.report.causes import causes_lines
 from vehnav.report.circle import radius_95
 from vehnav.report.document import errors_after_gaps, log_sources
 from vehnav.units import DEG, DEG_PER_HOUR, NS
@@ -21,7 +23,7 @@ METHOD_NAMES: Final = {
 
 def summary(run: Run) -> str:
     """The screen of ``vehnav run``."""
-    blocks = [_input(run), _start(run), _stops(run), _methods(run), _answer(run)]
+    blocks = [_input(run), _start(run), _stops(run), _methods(run), _answer(run), causes_lines(run)]
     return "\n".join(line for block in blocks for line in block)
 
 
@@ -75,9 +77,20 @@ def _input(run: Run) -> list[str]:
     duration = (t.t_ns[-1] - t.t_ns[0]) * NS
     return [
         f"log        {run.log.path}",
-        f"           {log_sources(run.log)}; axes {run.axes}",
+        f"           {log_sources(run.log)}; {axes_text(run.orientation)}",
         f"track      {duration:.1f} s, {metres(t.path_length())}",
     ]
+
+
+def axes_text(orientation: Orientation) -> str:
+    """Letters and mount in force, and what gave them."""
+    text = f"axes {orientation.axes}"
+    if orientation.accel_axes not in (None, orientation.axes):
+        text += f", accelerometer {orientation.accel_axes}"
+    if any(orientation.mount):
+        roll, pitch, yaw = (x / DEG for x in orientation.mount)
+        text += f", mount {roll:+.1f},{pitch:+.1f},{yaw:+.1f} deg"
+    return text
 
 
 def _start(run: Run) -> list[str]:
