@@ -1,4 +1,4 @@
-"""The drive between two stops: sensitivities against the mechanization, covariances against draws."""
+"""The drive between two stops: against the mechanization, and covariances against draws."""
 
 from __future__ import annotations
 

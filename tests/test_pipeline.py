@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 
 from tests.logs_for_tests import ORIGIN, START_NS, speed_profile, straight_log
+from vehnav.choices import METHODS
 from vehnav.config import Config
 from vehnav.errors import ConfigError, LogError
 from vehnav.logs.log import Gnss, Imu, Log
 from vehnav.mounting import c_bs_from_letters, right_handed_axes
-from vehnav.pipeline import METHODS, run
+from vehnav.pipeline import run
 from vehnav.prepare import split_log
 from vehnav.units import DEG, DEG_PER_HOUR
 

@@ -55,7 +55,8 @@ def test_boston_by_default_ends_within_300_m(boston) -> None:
 
 
 def test_boston_before_its_first_stop_is_integrated_backward(boston) -> None:
-    assert boston.trajectory.t_ns[0] == boston.log.imu.t_ns[0]
+    away = boston.trajectory.t_ns[0] - boston.log.imu.t_ns[0]
+    assert abs(int(away)) < 50_000_000  # ns: the stamps are regressed
     assert boston.errors_before is not None
     assert boston.errors_before.horizontal.max() < 300.0  # 88 s, free, MEMS
 

@@ -303,6 +303,24 @@ def noise_from_rest(
     )
 
 
+def noise_of_sensor(
+    noise: LegNoise, *, gyro_noise: float, gyro_walk: float, accel_noise: float, accel_bias: float
+) -> LegNoise:
+    """Figures from the log's rest, with those of a known sensor where they say more.
+
+    ``gyro_noise`` rad/sqrt(s), ``gyro_walk`` rad/s/sqrt(s), ``accel_noise`` m/s/sqrt(s),
+    ``accel_bias`` m/s2. The noise is never taken below what the rest shows: vibration is no part
+    of a data sheet.
+    """
+    return replace(
+        noise,
+        gyro_white=max(noise.gyro_white, gyro_noise),
+        accel_white=max(noise.accel_white, accel_noise),
+        gyro_bias_walk=gyro_walk or noise.gyro_bias_walk,
+        accel_bias=accel_bias or noise.accel_bias,
+    )
+
+
 def stop_findings(
     stops: list[Stop], records: list[StopRecord], t_ns: npt.NDArray[np.int64]
 ) -> list[Finding]:

@@ -26,6 +26,8 @@ class Config:
     mount : (roll, pitch, yaw), deg
     start, end : float or None
         s from the start of the log.
+    stamps : {"auto", "raw"}
+        Whether jittered stamps of an even sensor are regressed.
     max_gap : float
         s; longer gaps coast.
     split : bool
@@ -33,6 +35,9 @@ class Config:
     method : {"stops", "free", "filter", "smooth"}
     aid : tuple of str or None
         Aids of the filter, of :data:`AIDS`; None: all that the log has except ``gnss``.
+    sensor : str or None
+        Name of the catalogue or TOML file: its noise weighs the stops beside the log's own rest,
+        its stop threshold counts where none is given.
     sensor_grade : {"auto", "mems", "tactical"}
         Noise of the filter; ``auto``: by the gyro at rest.
     azimuth : {"relative", "absolute"}
@@ -73,10 +78,12 @@ class Config:
     mount: tuple[float, float, float] = (0.0, 0.0, 0.0)
     start: float | None = None
     end: float | None = None
+    stamps: Literal["auto", "raw"] = "auto"
     max_gap: float = 0.5
     split: bool = False
     method: Literal["stops", "free", "filter", "smooth"] = "stops"
     aid: tuple[str, ...] | None = None
+    sensor: str | None = None
     sensor_grade: Literal["auto", "mems", "tactical"] = "auto"
     azimuth: Literal["relative", "absolute"] = "relative"
     as_published: bool = False

@@ -15,29 +15,36 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from vehnav.aided import judge_aided, run_aided
+from vehnav.aided import judge_aided, outage_intervals, run_aided
+from vehnav.choices import (
+    METHODS,
+    check_levelling_rate,
+    corrections_of,
+    given_start,
+    leg_noise,
+    stop_rule,
+)
 from vehnav.classic import (
     Corrections,
     Drive,
     Outcome,
     Start,
     StopRecord,
-    noise_from_rest,
     stop_findings,
 )
 from vehnav.config import Config
 from vehnav.earth import ELLIPSOIDS
-from vehnav.errors import ConfigError, Finding, LogError, VehnavError
+from vehnav.errors import Finding, LogError, VehnavError
 from vehnav.evaluation import Errors, compare
 from vehnav.gps_axes import gps_between, with_axes
 from vehnav.legs import LegNoise
 from vehnav.logs.log import Gnss, Log
+from vehnav.logs.restamp import even_stamps
 from vehnav.offline import run_stops
 from vehnav.orientation import Declared, Orientation
 from vehnav.prepare import Samples, prepare_samples, usable_imu
-from vehnav.start import Alignment, Given, GpsUse, find_start
+from vehnav.start import Alignment, GpsUse, find_start
 from vehnav.stops import (
-    RMS_RULE,
     Stop,
     StopRule,
     StopStatistics,
@@ -53,15 +60,6 @@ Array = npt.NDArray[np.float64]
 DEFAULTS: Final = Config()
 VARIANT_RATE: Final = 10.0
 """Hz at which the tracks of the other methods are kept."""
-
-METHODS: Final = {
-    "free": Corrections(levelling=False, reset=False, refine=False),
-    "levelling": Corrections(levelling=True, reset=False, refine=False),
-    "reset": Corrections(levelling=False, reset=True, refine=False),
-    "as_published": Corrections(levelling=True, reset=True, refine=False),
-    "default": Corrections(),
-}
-"""The methods of the table that every run prints (paper 002's comparison, and ours)."""
 
 
 @dataclass(frozen=True)
@@ -178,16 +176,16 @@ def run(log: Log, config: Config = DEFAULTS) -> Run:
     )
     if config.aided:
         return _run_filter(drive, log, config, samples)
-    _check_levelling_rate(config, samples)
+    check_levelling_rate(config, samples)
     gnss = log.gnss if config.gps != "none" else None
-    noise = noise_from_rest(drive)
+    noise = leg_noise(drive, config)
 
     def solve(part: Drive, start: Start, corrections: Corrections) -> Outcome:
         return run_stops(part, start, corrections, noise=noise)
 
     corrections = corrections_of(config)
     start, alignment, gps, sigmas, start_findings = find_start(
-        drive, samples, gnss, _given(config), corrections, solve
+        drive, samples, gnss, given_start(config), corrections, solve
     )
     gps = with_axes(gps, samples, gnss)
     outcome = _solve(drive, start, corrections, noise, sigmas)
@@ -206,7 +204,8 @@ def run(log: Log, config: Config = DEFAULTS) -> Run:
 
 def _run_filter(drive: Drive, log: Log, config: Config, samples: Samples) -> Run:
     """The same with ``--method filter`` or ``smooth``."""
-    aided = run_aided(drive, samples.t_ns, log, config, _given(config))
+    aided = run_aided(drive, samples.t_ns, log, config, given_start(config))
+    aided = replace(aided, gps=with_axes(aided.gps, samples, log.gnss))
     trajectory = _trajectory(aided.outcome, samples, drive.stops)
     errors = judge_aided(trajectory, log, aided, config)
     findings = [*log.findings, *samples.findings, *aided.findings]
@@ -215,26 +214,6 @@ def _run_filter(drive: Drive, log: Log, config: Config, samples: Samples) -> Run
         log, config, samples.orientation, trajectory, drive.stops, aided.outcome.records,
         aided.alignment, aided.gps, errors, None, {}, {}, None, tuple(findings),
     )  # fmt: skip
-
-
-def corrections_of(config: Config) -> Corrections:
-    """Which procedures the options ask for."""
-    if config.method == "free":
-        return METHODS["free"]
-    refine = not config.as_published and config.levelling and config.reset
-    return Corrections(config.levelling, config.reset, refine, config.causal)
-
-
-def stop_rule(config: Config) -> StopRule:
-    """The rule of the options, with the defaults of its statistic."""
-    rule = StopRule() if config.stop_statistic == "slow" else RMS_RULE
-    if config.stop_threshold is not None:
-        rule = replace(rule, threshold=config.stop_threshold * DEG)
-    if config.stop_window is not None:
-        rule = replace(rule, window=config.stop_window)
-    if config.stop_dwell is not None:
-        rule = replace(rule, dwell=config.stop_dwell)
-    return rule
 
 
 def search_stops(log: Log, config: Config = DEFAULTS) -> StopSearch:
@@ -272,43 +251,22 @@ def _samples(log: Log, config: Config) -> Samples:
         start_ns=stamp(config.start),
         end_ns=stamp(config.end),
     )
-    return prepare_samples(
+    imu, stamps = even_stamps(imu) if config.stamps == "auto" else (imu, [])
+    samples = prepare_samples(
         imu,
         path=log.path,
         start_ns=log.start_ns,
         declared=Declared.of_degrees(config.axes, config.accel_axes, config.mount),
         max_gap=config.max_gap,
         rule=stop_rule(config),
-        gps=gps_between(None if config.gps == "none" else log.gnss, log.start_ns),
+        gps=gps_between(
+            None if config.gps == "none" else log.gnss,
+            log.start_ns,
+            without=outage_intervals(config, log.start_ns, int(imu.t_ns[-1])),
+        ),
         gps_seconds=config.gps_start_seconds,
     )
-
-
-def _check_levelling_rate(config: Config, samples: Samples) -> None:
-    """ConfigError where the levelling loop would not settle: k g dt must stay below 1 (A 4.3)."""
-    longest = float(np.max(np.diff(samples.t)))
-    if config.levelling_rate is not None and config.levelling_rate * longest >= 1.0:
-        raise ConfigError(
-            f"--levelling-rate {config.levelling_rate:g} 1/s: times the longest step, "
-            f"{longest:.3f} s, it must stay below 1"
-        )
-
-
-def _given(config: Config) -> Given:
-    """What the options say of the start, in radians."""
-    position, heading, attitude = (
-        config.start_position,
-        config.start_heading,
-        config.start_attitude,
-    )
-    return Given(
-        position=None if position is None else (position[0] * DEG, position[1] * DEG, position[2]),
-        heading=None if heading is None else heading * DEG,
-        attitude=None
-        if attitude is None
-        else (attitude[0] * DEG, attitude[1] * DEG, attitude[2] * DEG),
-        gps_seconds=config.gps_start_seconds,
-    )
+    return replace(samples, findings=(*stamps, *samples.findings))
 
 
 def _solve(

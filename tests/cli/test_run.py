@@ -155,6 +155,27 @@ def test_levelling_rate_too_high_for_the_step_is_refused(drive, tmp_path) -> Non
     assert "levelling" in result.stderr
 
 
+def test_a_sensor_weighs_the_stops_and_sets_their_threshold(drive, tmp_path) -> None:
+    file = tmp_path / "mine.toml"
+    file.write_text('[sensor]\nbase = "hg1700"\ngyro_walk = 60.0\nstop_threshold = 0.001\n')
+    default = json.loads(vehnav("run", drive, "--json", "--out-dir", tmp_path / "a").stdout)
+    named = vehnav("run", drive, "--sensor", "hg1700", "--json", "--out-dir", tmp_path / "b")
+    assert named.exit_code == 0, named.stderr
+    noise = json.loads(named.stdout)["noise"]
+    assert noise["accel_bias_m_s2"] == pytest.approx(9.80665e-3)  # 1 mg
+    assert default["noise"]["accel_bias_m_s2"] == pytest.approx(0.02)
+    strict = vehnav("run", drive, "--sensor", file, "--out-dir", tmp_path / "c")
+    assert strict.exit_code == 2  # no stop under its threshold
+    assert "threshold 0.00" in strict.stderr
+    given = vehnav(
+        "run", drive, "--sensor", file, "--stop-threshold", 0.3, "--out-dir", tmp_path / "d"
+    )
+    assert given.exit_code == 0
+    walk = json.loads((tmp_path / "d" / "report.json").read_text())["noise"]
+    assert walk["gyro_bias_walk_deg_s_sqrt_s"] == pytest.approx(60.0 / 3600.0 / 60.0)
+    assert vehnav("run", drive, "--sensor", "nonsense", "--out-dir", tmp_path).exit_code == 2
+
+
 # ---- bad input ---------------------------------------------------------------------------------
 
 

@@ -13,13 +13,13 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
+from vehnav.choices import METHODS
 from vehnav.cli.main import cli
 from vehnav.earth import KRASOVSKY
 from vehnav.errors import ConfigError
 from vehnav.papers import PAPERS, claims, paper000, paper002, paper004, run_papers
 from vehnav.papers.claims import Row
 from vehnav.papers.rerun import markdown
-from vehnav.pipeline import METHODS
 from vehnav.strapdown.eci import EciForm
 
 

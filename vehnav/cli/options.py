@@ -270,9 +270,14 @@ def input_options(func: F) -> F:
 
 
 def span_options(func: F) -> F:
-    """``start``, ``end`` (:class:`Instant` or None) and ``max_gap`` (s)."""
+    """``start``, ``end`` (:class:`Instant` or None), ``stamps`` and ``max_gap`` (s)."""
     return _apply(
         [
+            option(
+                "input", "--stamps", type=click.Choice(["auto", "raw"]), default="auto",
+                show_default=True,
+                help="auto: jittered stamps of an IMU that samples evenly are regressed.",
+            ),
             option(
                 "input", "--start", type=InstantType(),
                 help="Begin here: seconds from the start of the log, or an ISO time.",

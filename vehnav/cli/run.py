@@ -53,10 +53,11 @@ class AidsType(ParamType):
 RESULTS = ("trajectory.csv", "report.json", "report.html")
 """What every run writes into its folder."""
 RUN_FIELDS = (
-    "axes", "accel_axes", "mount", "max_gap", "split", "method", "as_published", "levelling",
+    "axes", "accel_axes", "mount", "stamps", "max_gap", "split", "method", "as_published",
+    "levelling",
     "reset", "causal", "frame", "vertical", "ellipsoid", "levelling_rate", "stop_threshold",
     "stop_statistic", "stop_window", "stop_dwell", "gps", "gps_start_seconds", "start_position",
-    "start_heading", "start_attitude", "aid", "sensor_grade", "azimuth", "outage",
+    "start_heading", "start_attitude", "aid", "sensor", "sensor_grade", "azimuth", "outage",
 )  # fmt: skip
 
 
@@ -97,6 +98,11 @@ RUN_FIELDS = (
     "method", "--aid", type=AidsType(), metavar="NAMES",
     help="Aids of the filter: zupt,zaru,nhc,odometer,gnss.  [default: all that the log has except "
     "gnss]",
+)  # fmt: skip
+@option(
+    "method", "--sensor", metavar="NAME|FILE",
+    help="Sensor of the catalogue (hg1700, mems-industrial, ...) or TOML file: its noise weighs "
+    "the stops.  [default: the log's own rest]",
 )  # fmt: skip
 @option(
     "method", "--sensor-grade", type=click.Choice(["auto", "mems", "tactical"]), default="auto",

@@ -11,11 +11,12 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from vehnav.choices import METHODS
 from vehnav.config import Config
 from vehnav.earth import position_difference
 from vehnav.papers.claims import Row, at_least, at_most
 from vehnav.papers.parallel import by_processes
-from vehnav.pipeline import METHODS, Run, run
+from vehnav.pipeline import Run, run
 from vehnav.rotation import angles_from_c_nb
 from vehnav.simulate.generate import SimulatedLog, simulate
 from vehnav.trajectory import Trajectory

@@ -13,6 +13,7 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
+from vehnav.choices import METHODS, corrections_of
 from vehnav.evaluation.reference import (
     COURSE_WINDOW,
     mean_motion,
@@ -21,7 +22,7 @@ from vehnav.evaluation.reference import (
     trusted_velocity,
 )
 from vehnav.logs.log import Gnss
-from vehnav.pipeline import METHODS, Run, corrections_of
+from vehnav.pipeline import Run
 from vehnav.report.scale import between_gaps, envelope
 from vehnav.units import NS
 
