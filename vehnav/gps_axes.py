@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Final
 
@@ -20,18 +21,23 @@ FEWEST: Final = 5
 """Fixes below which there is no motion to speak of."""
 
 
-def gps_between(gnss: Gnss | None, start_ns: int) -> GpsBetween | None:
+def gps_between(
+    gnss: Gnss | None, start_ns: int, *, without: Sequence[tuple[int, int]] = ()
+) -> GpsBetween | None:
     """Velocity by GPS between two instants (s from ``start_ns``), from the fixes between them only.
 
     None where there is no GPS, or it must not be used. A stretch that ends at some instant owes
-    nothing to any fix after it.
+    nothing to any fix after it, nor to those in the intervals ``without`` (ns).
     """
     if gnss is None:
         return None
+    allowed = np.ones(gnss.t_ns.size, bool)
+    for start, end in without:
+        allowed &= (gnss.t_ns < start) | (gnss.t_ns > end)
 
     def between(first: float, last: float) -> GpsMotion | None:
         t = np.asarray((gnss.t_ns - start_ns) * NS, float)
-        inside = (t >= first) & (t <= last)
+        inside = allowed & (t >= first) & (t <= last)
         if np.count_nonzero(inside) < FEWEST:
             return None
         part = Gnss(
