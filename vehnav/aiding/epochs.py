@@ -73,9 +73,8 @@ def predict(
     decay[SIDE] = kept
     decay[LIFT] = kept
     propagate(p, phi, decay, work[:9])
-    gyro = noise.gyro + noise.gyro_share * abs(rate[2])
     accel = noise.accel + noise.accel_share * np.hypot(force[0], force[1])
-    q = gyro * gyro * dt
+    q = noise.gyro * noise.gyro * dt
     for a in range(9):
         for b in range(9):
             p[a, b] += q * (g[a, 0] * g[b, 0] + g[a, 1] * g[b, 1] + g[a, 2] * g[b, 2])

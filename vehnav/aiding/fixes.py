@@ -14,8 +14,8 @@ Array = npt.NDArray[np.float64]
 
 DEFAULT_SIGMA: Final = 2.0
 """m per horizontal axis of a receiver that logs none; twice that for the height."""
-LEAST_SIGMA: Final = 0.02
-"""m: antenna, stamps and swaying leave this even with a phase solution."""
+LEAST_SIGMA: Final = 0.01
+"""m: stamps and swaying leave this even with a phase solution."""
 DEFAULT_VELOCITY_SIGMA: Final = 0.2
 """m/s, where velocities are logged without one."""
 SPEED_SPAN: Final = 3.0

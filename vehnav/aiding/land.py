@@ -125,7 +125,7 @@ def tuning_from_log(drive: Drive, *, tactical: bool | None = None) -> Tuning:
     if tactical:
         return Tuning("tactical", reason, noise, 0.02 * DEG, 0.02, 1e-3, 1e-3)
     stopped = bool(drive.stops)
-    return Tuning("mems", reason, noise, (0.05 if stopped else 0.1) * DEG, 0.05, 0.01, 0.02)
+    return Tuning("mems", reason, noise, (0.05 if stopped else 0.1) * DEG, 0.05, 0.005, 0.02)
 
 
 def run_land(
