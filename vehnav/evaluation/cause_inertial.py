@@ -25,6 +25,7 @@ from vehnav.aiding.error_model import (
     STATES,
     VELOCITY,
 )
+from vehnav.classic import GUARD, MEAN_OFFSET
 from vehnav.earth import WGS84, Ellipsoid, curvature_radii, earth_rate, normal_gravity
 from vehnav.evaluation.cause_models import (
     ACCEL_PRIOR,
@@ -51,6 +52,8 @@ Array = npt.NDArray[np.float64]
 TimeArray = npt.NDArray[np.int64]
 
 AXES: Final = ("right", "forward", "up")
+SETTLED: Final = 1.0
+"""s into a stop from which levelling works, about."""
 WALK: Final = 0.05
 """Walk of the accelerometer bias per sqrt(s) over its white noise: the ratio that the project takes
 for gyros (:func:`vehnav.classic.noise_from_rest`)."""
@@ -240,6 +243,21 @@ def _forces(motion: Motion) -> Array:
     return np.asarray(np.einsum("kij,ki->kj", axes, f_n))
 
 
+def _kept_tilt(motion: Motion) -> Array:
+    """(g-1,): what each step of a stop leaves of a tilt, 1 where nothing is levelled.
+
+    The running mean has the gain 1/(t + 0.5 s): a tilt at t is (t + 0.5)/(t' + 0.5) of itself at
+    t', and a gyro bias keeps half of what it turns in the stop.
+    """
+    kept = np.ones(motion.t.size - 1)
+    for number in range(motion.stops):
+        inside = np.flatnonzero(motion.stop == number)
+        t = motion.t[inside]
+        since = np.clip(np.minimum(t, t[-1] - GUARD) - t[0] - SETTLED, 0.0, None)
+        kept[inside[:-1]] = (since[:-1] + MEAN_OFFSET) / (since[1:] + MEAN_OFFSET)
+    return kept
+
+
 def _propagate(
     motion: Motion,
     edges: Array,
@@ -254,6 +272,7 @@ def _propagate(
     phi, drive = _steps(motion)
     turning = motion.turned()[:, 2] / np.diff(motion.t)
     force, gravity = _forces(motion), _gravity(motion)
+    kept = _kept_tilt(motion)
     middle = 0.5 * (motion.t[1:] + motion.t[:-1])
     piece = np.clip(np.searchsorted(edges, middle, side="right") - 1, 0, edges.size - 2)
     moved = np.zeros((motion.t.size, 2, state.shape[1]))
@@ -272,10 +291,11 @@ def _propagate(
         stop = int(motion.stop[k + 1])
         if stop >= 0 and reset:
             state[VELOCITY] = 0.0
-        if stop >= 0 and levelling:
+        if kept[k] < 1.0 and levelling:
             level = _level(motion.c_nb[k + 1], gravity) @ now[:3]
             first = at.level.start + 2 * stop
             level[:, first : first + 2] += np.eye(2)
-            state[ATTITUDE.start : ATTITUDE.start + 2] = level
+            tilt = slice(ATTITUDE.start, ATTITUDE.start + 2)
+            state[tilt] = level + kept[k] * (state[tilt] - level)
         moved[k + 1], turn[k + 1] = state[POSITION.start : POSITION.start + 2], state[ATTITUDE]
     return moved, turn

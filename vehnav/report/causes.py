@@ -30,8 +30,8 @@ SHOWN: Final = 0.005
 NOTE: Final = (
     "The sources of the linear error model, fitted to the error against GPS; values are estimate "
     "minus truth, ± one sigma. Shares are of the squared error over the drive and add up to 100 %; "
-    "a negative one worked against the others. A wrong mounting yaw looks like a wrong heading, and a "
-    "gyro turned against the accelerometers by 1 mrad like an accelerometer bias of 1 mg."
+    "a negative one worked against the others. A wrong mounting yaw looks like a wrong heading, "
+    "and a gyro turned against the accelerometers by 1 mrad like an accelerometer bias of 1 mg."
 )
 
 
