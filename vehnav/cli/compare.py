@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import shlex
+import sys
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -85,6 +88,7 @@ class BarType(ParamType):
         "vehnav compare city.vehnav/trajectory.csv city.mcap",
         "vehnav compare a.csv b.tum gnss.pos --max horizontal_m.max=50",
         "vehnav compare a.csv gps.csv --gps-time-offset -0.6 --json",
+        "vehnav compare a.csv b.csv gps.csv --html compare.html",
     ],
 )
 @click.argument("files", nargs=-1, required=True, metavar="TRAJECTORY... GPS")
@@ -140,6 +144,13 @@ class BarType(ParamType):
     multiple=True,
     help="Exit status 1 if the metric is larger, for any of the trajectories. Repeatable.",
 )
+@click.option(
+    "--html", metavar="FILE", help="Write one page with map, plots and tables; it opens offline."
+)
+@click.option(
+    "--plots", metavar="DIR",
+    help="Also draw the figures of that page here, as PNG and PDF (pip install vehnav[plots]).",
+)  # fmt: skip
 @json_option
 @strict_option
 def compare(files: tuple[str, ...], as_json: bool, strict: bool, **options: Any) -> None:
@@ -153,10 +164,13 @@ def compare(files: tuple[str, ...], as_json: bool, strict: bool, **options: Any)
         raise click.UsageError(
             "two files are needed: TRAJECTORY... GPS", click.get_current_context()
         )
+    if options["html"] or options["plots"]:
+        _check_picture(files)
     tracks = [_load(path, options) for path in files]
     results = [_judge(track, tracks[-1], options) for track in tracks[:-1]]
     documents = [_document(path, errors) for path, errors in zip(files[:-1], results, strict=True)]
     missed = _missed_bars(documents, options["bars"])
+    _write(tracks, results, [bar["text"] for bar in missed], options)
     if as_json:
         reference = {"file": files[-1], "findings": _plain(tracks[-1].findings)}
         print_json({"reference": reference, "trajectories": documents, "missed": missed})
@@ -167,6 +181,30 @@ def compare(files: tuple[str, ...], as_json: bool, strict: bool, **options: Any)
     for bar in missed:
         click.echo(f"missed: {bar['text']}", err=True)
     finish(strict=strict, findings=findings, bar_missed=bool(missed))
+
+
+def _check_picture(files: tuple[str, ...]) -> None:
+    from vehnav.report.comparison import check_number
+
+    check_number(len(files) - 1)
+
+
+def _write(
+    tracks: Sequence[Track], results: Sequence[Errors], missed: list[str], options: dict[str, Any]
+) -> None:
+    """The page and the figures, where they are asked for."""
+    if not (options["html"] or options["plots"]):
+        return
+    from vehnav.report.comparison import comparison
+    from vehnav.report.comparison_page import write_comparison
+    from vehnav.report.plots import write_comparison_plots
+
+    item = comparison(tracks, results)
+    if options["html"]:
+        command = shlex.join(["vehnav", *sys.argv[1:]])
+        write_comparison(item, Path(options["html"]), command=command, missed=missed)
+    if options["plots"]:
+        write_comparison_plots(item, Path(options["plots"]))
 
 
 def _load(path: str, options: dict[str, Any]) -> Track:

@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-import base64
-import hashlib
 from collections.abc import Mapping
-from importlib import resources
 from pathlib import Path
 from typing import Any
 
-from vehnav._version import __version__
 from vehnav.export.atomic import atomic_path
 from vehnav.pipeline import Run
 from vehnav.report import causes, quality, sections
 from vehnav.report.mapping import map_of
 from vehnav.report.markup import esc
+from vehnav.report.page import page, section
 from vehnav.report.panels import panels
 from vehnav.report.svg import map_figure, panel
 
@@ -23,9 +20,9 @@ def write_html(
     run: Run, document: Mapping[str, Any], path: Path, *, command: str | None = None
 ) -> None:
     """Write :func:`render_html` whole or not at all."""
-    page = render_html(run, document, command=command)
+    text = render_html(run, document, command=command)
     with atomic_path(path) as temporary:
-        temporary.write_text(page, encoding="utf-8")
+        temporary.write_text(text, encoding="utf-8")
 
 
 def render_html(run: Run, document: Mapping[str, Any], *, command: str | None = None) -> str:
@@ -46,21 +43,21 @@ def render_html(run: Run, document: Mapping[str, Any], *, command: str | None = 
         f'<main><div class="linked"><div class="left">{map_figure(map_of(run))}</div>'
         f'<div class="right">{_panels(run)}</div></div>',
         _judged(run),
-        _section("causes", "What caused the error", causes.causes_block(run), causes.NOTE),
-        _section("stops", "What each stop corrected", sections.stops_table(document), STOPS_NOTE),
-        _section(
+        section("causes", "What caused the error", causes.causes_block(run), causes.NOTE),
+        section("stops", "What each stop corrected", sections.stops_table(document), STOPS_NOTE),
+        section(
             "sensor",
             "The sensor at rest",
             quality.sensor_table(run),
             f"{SENSOR_NOTE} {esc(quality.fit_note(document))}",
         ),
-        _section("findings", "Findings", sections.findings_list(document)),
-        _section("start", "Start and use of GPS", sections.start_details(run, document)),
-        _section("input", "Recording", sections.input_details(document)),
-        _section("repeat", "How to repeat it", _repeat(repeat, document)),
+        section("findings", "Findings", sections.findings_list(document)),
+        section("start", "Start and use of GPS", sections.start_details(run, document)),
+        section("input", "Recording", sections.input_details(document)),
+        section("repeat", "How to repeat it", _repeat(repeat, document)),
         "</main>",
     ]
-    return _page(sections.title(run), "".join(body))
+    return page(sections.title(run), "".join(body))
 
 
 METHODS_NOTE = (
@@ -94,7 +91,7 @@ def _judged(run: Run) -> str:
         ("segments", "Over lengths of road", quality.segments_table(run), SEGMENTS_NOTE),
         ("honest", "Are the expected errors honest?", quality.calibration_table(run), HONEST_NOTE),
     ]
-    return f'<div class="blocks">{"".join(_section(*block) for block in blocks)}</div>'
+    return f'<div class="blocks">{"".join(section(*block) for block in blocks)}</div>'
 
 
 SEGMENTS_NOTE = "Mean error of the displacement over every stretch of that length, as in KITTI."
@@ -103,13 +100,6 @@ HONEST_NOTE = (
     "included where it gives one. The fixes of one drive are not independent: a single drive shows "
     "rough agreement at best."
 )
-
-
-def _section(key: str, title: str, content: str, note: str = "") -> str:
-    if not content:
-        return ""
-    note = f'<p class="note">{note}</p>' if note else ""
-    return f'<section id="{key}"><h2>{esc(title)}</h2>{content}{note}</section>'
 
 
 def _header(run: Run, document: Mapping[str, Any]) -> str:
@@ -140,27 +130,3 @@ def _repeat(command: str, document: Mapping[str, Any]) -> str:
         "<details><summary>Every option in force</summary>"
         f'<p class="note">Marked: not the default.</p>{sections.config_details(document)}</details>'
     )
-
-
-def _page(title: str, body: str) -> str:
-    """The whole document; its policy lets nothing load and no script run but its own."""
-    style, script = _resource("page.css"), _resource("page.js")
-    digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
-    policy = (
-        "default-src 'none'; img-src data:; style-src 'unsafe-inline'; "
-        f"script-src 'sha256-{digest}'"
-    )
-    return (
-        '<!doctype html>\n<html lang="en"><head><meta charset="utf-8">'
-        f'<meta http-equiv="Content-Security-Policy" content="{policy}">'
-        '<meta name="viewport" content="width=device-width,initial-scale=1">'
-        '<meta name="color-scheme" content="light dark">'
-        f'<meta name="generator" content="vehnav {esc(__version__)}">'
-        f'<link rel="icon" href="data:,"><title>{esc(title)} - vehnav</title>'
-        f"<style>{style}</style></head>\n<body>{body}"
-        f"<footer>vehnav {esc(__version__)}</footer>\n<script>{script}</script></body></html>\n"
-    )
-
-
-def _resource(name: str) -> str:
-    return resources.files("vehnav.report").joinpath(name).read_text("utf-8")

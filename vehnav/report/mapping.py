@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -76,7 +77,8 @@ class Map:
     """All that is on the map; ``box`` is west, south, east, north, m.
 
     ``too_large``: how many ellipses are larger than the map. ``scale_side``: the lower corner,
-    ``left`` or ``right``, that the tracks leave free for the scale bar.
+    ``left`` or ``right``, that the tracks leave free for the scale bar. ``equal``: no track is the
+    vehicle's own, the cursor shows all of them. ``note``: stands under the map.
     """
 
     box: Box
@@ -90,6 +92,8 @@ class Map:
     local: bool
     north_known: bool
     scale_side: str
+    equal: bool = False
+    note: str = ""
 
 
 def map_of(run: Run) -> Map:
@@ -104,7 +108,7 @@ def map_of(run: Run) -> Map:
     stops = _stops(run, origin)
     ellipses = _ellipses(run, origin)
     seen = [p for track in tracks if track.role in ("ours", "gps") for _, p in track.parts]
-    box = _box(np.concatenate(seen), ellipses)
+    box = box_around(np.concatenate(seen), ellipses)
     width = box[2] - box[0]
     drawn = [e for e in ellipses if SMALL * width < max(e.a_east, e.a_north) < LARGE * width]
     return Map(
@@ -118,7 +122,7 @@ def map_of(run: Run) -> Map:
         miss=_miss(run, origin),
         local=run.alignment.local,
         north_known=run.alignment.heading_from != "none",
-        scale_side=_free_side(np.concatenate(seen), box),
+        scale_side=free_side(np.concatenate(seen), box),
     )
 
 
@@ -148,17 +152,24 @@ def _gps(run: Run, origin: tuple[float, float, float]) -> tuple[Track | None, Tr
         return None, None
     place = local_enu(gnss.lat, gnss.lon, gnss.height, origin=origin)[within, :2]
     t = log_seconds(run, gnss.t_ns[within])
-    parts, used = [], []
+    parts, used = fix_lines(t, place), []
     begin, until = gps_window(run)
+    for x, p in parts:
+        early = (x >= begin) & (x <= until)
+        if np.count_nonzero(early) > 1 and run.gps.fixes_used:
+            used.append((x[early], p[early]))
+    highlight = Track("GPS used for the start", "used", tuple(used)) if used else None
+    return Track("GPS", "gps", parts), highlight
+
+
+def fix_lines(t: Array, place: Array) -> tuple[tuple[Array, Array], ...]:
+    """Fixes at t (m,) s and place (m, 2) m as thinned lines between the gaps."""
+    parts = []
     for part in between_gaps(t, least=GPS_GAP):
         x, p = t[part], place[part]
         keep = keep_points(x, p, GPS_TOLERANCE) if x.size > 1 else np.arange(x.size)
         parts.append((x[keep], p[keep]))
-        early = keep[(x[keep] >= begin) & (x[keep] <= until)]
-        if early.size > 1 and run.gps.fixes_used:
-            used.append((x[early], p[early]))
-    highlight = Track("GPS used for the start", "used", tuple(used)) if used else None
-    return Track("GPS", "gps", tuple(parts)), highlight
+    return tuple(parts)
 
 
 def _at(run: Run, t: float, origin: tuple[float, float, float]) -> tuple[float, float]:
@@ -218,7 +229,7 @@ def _miss(
     return (float(own[0]), float(own[1])), (float(fix[0]), float(fix[1]))
 
 
-def _free_side(places: Array, box: Box) -> str:
+def free_side(places: Array, box: Box) -> str:
     """The lower corner with fewer points of the tracks: 12 % of the height, 35 % of the width."""
     west, south, east, north = box
     low = places[places[:, 1] < south + 0.12 * (north - south), 0]
@@ -227,7 +238,7 @@ def _free_side(places: Array, box: Box) -> str:
     return "right" if right < left else "left"
 
 
-def _box(places: Array, ellipses: list[Ellipse]) -> Box:
+def box_around(places: Array, ellipses: Sequence[Ellipse]) -> Box:
     """Around the tracks, widened for the ellipses a little, and not too narrow either way."""
     low, high = places.min(axis=0), places.max(axis=0)
     room = ELLIPSE_ROOM * max(float((high - low).max()), 10.0)

@@ -32,7 +32,12 @@ def _visible(c: str) -> str:
 
 
 def _unit_kept(head: str) -> str:
-    """The last word of a head, its unit, kept in one piece and with the word before it."""
+    """The last word of a head, its unit, kept in one piece and with the word before it.
+
+    A head that is markup stays as it is.
+    """
+    if "<" in head:
+        return head
     return re.sub(r" (\S{1,2})$", "\u00a0\\1", head).replace("/", "/\u2060")
 
 

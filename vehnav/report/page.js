@@ -68,6 +68,7 @@
     element.style.top = `${(y - view.y) / view.height * 100}%`;
   };
   const readout = map.querySelector(".readout");
+  const equal = "equal" in map.dataset; // several trajectories: each is named with its own error
   const tracks = all("path.curve", map).map((path) => {
     const parts = withTimes(path, readPath(path).map((part) => ({
       x: part.map(([x]) => x), y: part.map(([, y]) => y),
@@ -99,8 +100,12 @@
       place(dot, interpolate(part.t, part.x, t), interpolate(part.t, part.y, t));
     }
     const first = panels[0];
-    const values = first.outputs[0] && first.outputs[0].textContent;
-    readout.textContent = `${t.toFixed(1)} s` + (values ? ` \u00b7 error ${values} ${first.unit}` : "");
+    const values = first.outputs.flatMap((output, k) => {
+      if (!output.textContent || (k && !equal)) return [];
+      const name = equal ? output.parentNode.childNodes[1].textContent.trim() : "error";
+      return [` \u00b7 ${name} ${output.textContent}\u00a0${first.unit}`];
+    });
+    readout.textContent = `${t.toFixed(1)} s${values.join("")}`;
     document.documentElement.dataset.time = t.toFixed(3);
   };
 

@@ -123,11 +123,13 @@ def distance_panel(run: Run) -> Panel | None:
     if run.errors is None or run.errors.distance[-1] < 1.0:
         return None
     errors = run.errors
-    own = _over_distance(run, errors, own_name(run), "ours")
+    own = over_distance(log_seconds(run, errors.t_ns), errors, own_name(run), "ours")
     curves = [own]
     for name, role in others(run, ("as_published", "free")):
         if name in run.method_errors:
-            curves.append(_over_distance(run, run.method_errors[name], LEGEND[name], role))
+            judged = run.method_errors[name]
+            t = log_seconds(run, judged.t_ns)
+            curves.append(over_distance(t, judged, LEGEND[name], role))
     sigma = errors.states.sigma_pos
     band = None if sigma is None else expected_band(errors.distance, sigma)
     y_range = (0.0, _error_top(curves, band))
@@ -142,10 +144,11 @@ def distance_panel(run: Run) -> Panel | None:
     )  # fmt: skip
 
 
-def _over_distance(run: Run, errors: Errors, name: str, role: str) -> Curve:
-    keep = envelope(log_seconds(run, errors.t_ns), errors.horizontal, BINS)
+def over_distance(t: Array, errors: Errors, name: str, role: str) -> Curve:
+    """The horizontal error over the distance; t (n,) s of the judged fixes for the cursor."""
+    keep = envelope(t, errors.horizontal, BINS)
     part = errors.distance[keep], errors.horizontal[keep]
-    return Curve(name, role, (part,), (log_seconds(run, errors.t_ns)[keep],))
+    return Curve(name, role, (part,), (t[keep],))
 
 
 def drift_panel(run: Run) -> Panel | None:

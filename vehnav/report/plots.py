@@ -13,6 +13,7 @@ import numpy as np
 from vehnav.errors import ConfigError
 from vehnav.export.atomic import atomic_path
 from vehnav.pipeline import Run
+from vehnav.report.comparison import Comparison, comparison_map, comparison_panels
 from vehnav.report.figures import Panel
 from vehnav.report.mapping import Map, Track, map_of
 from vehnav.report.panels import panels
@@ -24,7 +25,8 @@ if TYPE_CHECKING:
 
 COLOURS: Final = {
     "ours": "#0b62d6", "gps": "#1c2128", "published": "#0d8a63", "free": "#d4620a",
-    "second": "#9a3fc0", "used": "#e3b400",
+    "second": "#9a3fc0", "levelling": "#8a6d00", "sixth": "#c23b84", "seventh": "#00808c",
+    "eighth": "#7a4a32", "used": "#e3b400",
 }  # fmt: skip
 """By role, as on the page in daylight."""
 BAND: Final = "#cfe0f7"
@@ -67,6 +69,33 @@ def write_plots(
     ConfigError
         matplotlib is not installed.
     """
+    return _write(_drawings(run), folder, formats, names)
+
+
+def write_comparison_plots(
+    item: Comparison,
+    folder: Path,
+    *,
+    formats: Sequence[str] = ("png", "pdf"),
+    names: Sequence[str] | None = None,
+) -> list[Path]:
+    """Write the map, every plot, and an overview of a comparison, as :func:`write_plots` does."""
+    place, found = comparison_map(item), comparison_panels(item)
+    drawings: dict[str, Callable[[], Figure]] = {"map": partial(_map_figure, place)}
+    drawings |= {p.key: partial(_panel_figure, p) for p in found}
+    chosen = [p for p in found if p.key in ("error", "error-along", "error-cross")]
+    return _write(
+        drawings | {"overview": partial(_overview, place, chosen)}, folder, formats, names
+    )
+
+
+def _write(
+    drawings: dict[str, Callable[[], Figure]],
+    folder: Path,
+    formats: Sequence[str],
+    names: Sequence[str] | None,
+) -> list[Path]:
+    """Draw and write those of ``names``; ConfigError without matplotlib."""
     try:
         from matplotlib import rc_context
     except ImportError as error:
@@ -76,7 +105,7 @@ def write_plots(
     folder.mkdir(parents=True, exist_ok=True)
     written = []
     with rc_context(STYLE):  # type: ignore[arg-type]
-        for name, draw in _drawings(run).items():
+        for name, draw in drawings.items():
             if names is not None and name not in names:
                 continue
             figure = draw()

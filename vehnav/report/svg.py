@@ -173,17 +173,20 @@ def map_figure(item: Map) -> str:
         drawn.append(f'<path class="miss" d="{points(*_on_map(item, ends))}"/>')
     marks = _marks(item)
     north = NORTH if item.north_known else ""
-    dots = "".join(f'<i class="dot c-{t.role}"></i>' for t in item.tracks if t.role in DOTTED)
+    dots = "".join(
+        f'<i class="dot c-{t.role}"></i>' for t in item.tracks if item.equal or t.role in DOTTED
+    )
+    equal = " data-equal" if item.equal else ""
     return (
-        f'<figure class="map" id="map"><figcaption><h3>Map <small>{_frame_text(item)}</small></h3>'
-        f"{_map_legend(item)}</figcaption>"
+        f'<figure class="map" id="map"{equal}><figcaption>'
+        f"<h3>Map <small>{_frame_text(item)}</small></h3>{_map_legend(item)}</figcaption>"
         f'<div class="plot" style="aspect-ratio:{width:.0f}/{height:.0f}" role="img" '
         f'aria-label="Map of the tracks">'
         f'<svg viewBox="0 0 {width:.0f} {height:.0f}" preserveAspectRatio="none" '
         f'aria-hidden="true">{"".join(drawn)}</svg>{"".join(marks)}{dots}'
         f"{_scale_bar(item)}{north}{ZOOM}</div>"
         '<p class="readout" aria-live="off">Point at the map or at a plot: the cursor is the same '
-        f"instant everywhere.</p>{_too_large(item)}</figure>"
+        f"instant everywhere.</p>{_notes(item)}</figure>"
     )
 
 
@@ -201,11 +204,12 @@ ZOOM: Final = (
 )
 
 
-def _too_large(item: Map) -> str:
+def _notes(item: Map) -> str:
+    note = f'<p class="note">{esc(item.note)}</p>' if item.note else ""
     if not item.too_large:
-        return ""
+        return note
     what = "expected ellipse is" if item.too_large == 1 else "expected ellipses are"
-    return f'<p class="note">{item.too_large} {what} larger than the map and not drawn.</p>'
+    return f'{note}<p class="note">{item.too_large} {what} larger than the map and not drawn.</p>'
 
 
 def _frame_text(item: Map) -> str:
