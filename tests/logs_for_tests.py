@@ -36,8 +36,8 @@ def straight_log(
     """A level drive due north with three stops; the Earth rate and gravity are in the samples.
 
     The road rocks it by 1 deg/s and 0.3 m/s2 at 1 to 2 Hz while it moves: without any vibration a
-    straight drive cannot be told from rest. ``noise`` scales 0.05 deg/s and 0.02 m/s2 a sample. The transport rate (0.5 deg/h at 15 m/s)
-    is left out of the gyro: 0.1 m here.
+    straight drive cannot be told from rest. ``noise`` scales 0.05 deg/s and 0.02 m/s2 a sample. The
+    transport rate (0.5 deg/h at 15 m/s) is left out of the gyro: 0.1 m here.
     """
     rng = np.random.default_rng(seed)
     t = np.arange(0.0, seconds, 1.0 / rate)
