@@ -7,7 +7,7 @@ outages are judged one by one.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -23,6 +23,7 @@ from vehnav.errors import Finding, LogError, VehnavError
 from vehnav.evaluation import Errors, compare
 from vehnav.logs.log import Gnss, Log
 from vehnav.start import Alignment, Given, GpsUse
+from vehnav.stops import Stop
 from vehnav.trajectory import Trajectory
 from vehnav.units import DEG, NS
 
@@ -30,6 +31,8 @@ Array = npt.NDArray[np.float64]
 
 NEAR_POLE: Final = 89.9 * DEG
 """rad of latitude beyond which East-North-Up columns of the output turn too fast to be of use."""
+VETO_SPEED: Final = 1.0
+"""m/s of GPS, in the median over a stop, that make it none (spec C 1)."""
 FEW_FIXES: Final = 3
 """Fixes below which GPS gives no start."""
 
@@ -41,6 +44,8 @@ class Aided:
     Attributes
     ----------
     outcome : Outcome
+    stops : list of Stop
+        Those that GPS did not veto.
     alignment : Alignment
     gps : GpsUse
     outages : tuple of (int, int)
@@ -51,6 +56,7 @@ class Aided:
     """
 
     outcome: Outcome
+    stops: list[Stop]
     alignment: Alignment
     gps: GpsUse
     outages: tuple[tuple[int, int], ...]
@@ -83,6 +89,7 @@ def run_aided(
     gnss = log.gnss if config.gps != "none" and log.gnss is not None else None
     cut = outage_intervals(config, origin, int(t_ns[-1])) if config.gps == "aid" else ()
     fixes, until = (None, None) if gnss is None else _usable(gnss, drive, config, origin, cut)
+    drive, vetoed = _veto_stops(drive, fixes)
     if fixes is None and not drive.stops and given.attitude is None:
         raise LogError(
             f"{log.path}: no stop was found and no GPS may be used, so nothing says how the "
@@ -102,11 +109,12 @@ def run_aided(
     )  # fmt: skip
     return Aided(
         result.outcome,
+        drive.stops,
         _alignment(drive, t_ns, start, given, fixes),
         _gps_use(fixes, until, config),
         cut,
         result,
-        tuple(_findings(start, result, fixes, given)),
+        tuple(vetoed + _findings(start, result, fixes, given)),
     )
 
 
@@ -157,6 +165,26 @@ def _usable(
         gnss.v_n, gnss.sigma_pos, gnss.sigma_vel,
     )  # fmt: skip
     return fixes.take(inside), until
+
+
+def _veto_stops(drive: Drive, fixes: Fixes | None) -> tuple[Drive, list[Finding]]:
+    """Without the stops in which GPS shows driving: perfectly even motion feels like rest."""
+    if fixes is None:
+        return drive, []
+    v = fixes.velocity(drive.earth)
+    speed = np.hypot(v[:, 0], v[:, 1])
+    kept = []
+    for stop in drive.stops:
+        inside = (fixes.t >= stop.start) & (fixes.t <= stop.end)
+        if not np.any(inside) or float(np.median(speed[inside])) < VETO_SPEED:
+            kept.append(stop)
+    if len(kept) == len(drive.stops):
+        return drive, []
+    text = (
+        f"{len(drive.stops) - len(kept)} of {len(drive.stops)} stops were none: GPS shows over "
+        f"{VETO_SPEED:g} m/s in them"
+    )
+    return replace(drive, stops=kept), [Finding("stop-vetoed", "warning", text)]
 
 
 def _speed(log: Log, config: Config, origin: int) -> tuple[Array, Array] | None:

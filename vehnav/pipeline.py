@@ -206,12 +206,12 @@ def _run_filter(drive: Drive, log: Log, config: Config, samples: Samples) -> Run
     """The same with ``--method filter`` or ``smooth``."""
     aided = run_aided(drive, samples.t_ns, log, config, given_start(config))
     aided = replace(aided, gps=with_axes(aided.gps, samples, log.gnss))
-    trajectory = _trajectory(aided.outcome, samples, drive.stops)
+    trajectory = _trajectory(aided.outcome, samples, aided.stops)
     errors = judge_aided(trajectory, log, aided, config)
     findings = [*log.findings, *samples.findings, *aided.findings]
     findings += [] if errors is None else list(errors.findings)
     return Run(
-        log, config, samples.orientation, trajectory, drive.stops, aided.outcome.records,
+        log, config, samples.orientation, trajectory, aided.stops, aided.outcome.records,
         aided.alignment, aided.gps, errors, None, {}, {}, None, tuple(findings),
     )  # fmt: skip
 

@@ -38,8 +38,13 @@ def answer(run: Run) -> str:
     share = "" if percent is None else f" ({percent:.1f} % of the distance)"
     return (
         f"{metres(float(horizontal[-1]))} off at the end{share}, {metres(float(horizontal.max()))} "
-        f"at most, over {metres(float(errors.distance[-1]))} and {seconds:.0f} s without GPS"
+        f"at most, over {metres(float(errors.distance[-1]))} and {seconds:.0f} s {_gps_word(run)}"
     )
+
+
+def _gps_word(run: Run) -> str:
+    """Whether the judged part had GPS."""
+    return "with GPS" if run.gps.used_for and run.gps.until_ns is None else "without GPS"
 
 
 def metres(value: float) -> str:
@@ -119,6 +124,9 @@ def _start(run: Run) -> list[str]:
             f"GPS        used for the start {' and '.join(use.used_for)}: {use.fixes_used} fixes "
             f"up to {until:.1f} s; none of them judges"
         )
+    elif use.used_for:
+        cut = "" if not run.config.outage else ", none in the outages"
+        lines.append(f"GPS        aids all the way: {use.fixes_used} fixes{cut}; all fixes judge")
     elif run.log.gnss is not None:
         lines.append("GPS        not used")
     return lines
@@ -162,9 +170,16 @@ def _answer(run: Run) -> list[str]:
     if run.errors is not None and run.errors.states.sigma_pos is not None:
         sigma = run.errors.states.sigma_pos[-1, :2]
         expected = float(radius_95(sigma))
-        lines.append(f"           expected without GPS: {metres(expected)} (95 %) at the end")
+        lines.append(f"           expected {_gps_word(run)}: {metres(expected)} (95 %) at the end")
     elif run.trajectory.sigma_pos is not None:
         sigma = run.trajectory.sigma_pos[-1, :2]
         expected = float(radius_95(sigma))
         lines.append(f"           expected error at the end: {metres(expected)} (95 %)")
+    for row in () if run.errors is None else run.errors.outages:
+        if row.max_m is not None and row.end_m is not None:
+            lines.append(
+                f"outage     {row.start_s:.0f} s, {row.length_s:.0f} s long, "
+                f"{metres(row.distance_m)}: {metres(row.max_m)} at most, {metres(row.end_m)} at "
+                "the end"
+            )
     return lines
