@@ -295,14 +295,38 @@ def span_options(func: F) -> F:
     )  # fmt: skip
 
 
+_CALIBRATED = {"axes", "accel_axes", "mount"}
+
+
+def _use_calibration(ctx: click.Context, param: click.Parameter, value: str | None) -> None:
+    """Take axes and mounting from a file; options on the command line still count more."""
+    from vehnav.cli.settings import load_config
+
+    if value is None or ctx.resilient_parsing:
+        return
+    values = load_config(ctx, value)
+    if not values or set(values) - _CALIBRATED:
+        raise ConfigError(
+            f"{value}: not a calibration: expected [input] with axes, accel_axes and mount, as "
+            "'vehnav info LOG --save-calibration FILE' writes it"
+        )
+    ctx.default_map = {**(ctx.default_map or {}), **values}
+
+
 def axes_options(func: F) -> F:
     """``axes`` (letters, ``auto`` or None), ``accel_axes`` (letters or None), ``mount`` (deg)."""
     return _apply(
         [
+            click.option(
+                "--calibration", metavar="FILE", is_eager=True, expose_value=False,
+                callback=_use_calibration,
+                help="Axes and mounting of this car, as 'vehnav info --save-calibration' wrote "
+                "them; --axes, --accel-axes and --mount count more.",
+            ),
             option(
                 "input", "--axes", type=AxesType(auto=True),
                 help="Where the sensor's x, y, z point in the vehicle: three letters of F B L R U "
-                "D; FLU is ROS.",
+                "D; FLU is ROS.  [default: auto, from gravity, departures, turns and GPS]",
             ),
             option(
                 "input", "--accel-axes", type=AxesType(auto=False),

@@ -1,0 +1,188 @@
+"""``vehnav info``, ``vehnav check`` and calibration files, on logs whose trouble is made here."""
+
+from __future__ import annotations
+
+import json
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from click.testing import CliRunner, Result
+
+from tests.logs_for_tests import straight_log
+from vehnav.cli.main import cli
+from vehnav.mounting import sensor_to_body
+
+
+def vehnav(*args: object) -> Result:
+    return CliRunner().invoke(cli, [str(a) for a in args])
+
+
+def write(path: Path, *, letters: str = "BRU", mount=(0.0, 0.0, 0.0), seconds=160.0) -> Path:
+    """The made drive, its case turned, as a CSV whose columns say neither axes nor units.
+
+    Axes of the file are taken as FLU then; GPS lies beside it.
+    """
+    log = straight_log(seconds=seconds, rate=50.0)
+    assert log.imu is not None
+    c_bs = sensor_to_body(letters, mount=tuple(np.radians(mount)))[0]
+    gyro, accel = log.imu.gyro @ c_bs, log.imu.accel @ c_bs
+    data = {"t_ns": log.imu.t_ns}
+    for k, axis in enumerate("xyz"):
+        data[f"g{axis}"] = gyro[:, k]
+        data[f"a{axis}"] = accel[:, k]
+    pd.DataFrame(data).to_csv(path, index=False)
+    assert log.gnss is not None
+    gnss = log.gnss
+    rows = {"t_ns": gnss.t_ns, "lat_deg": np.degrees(gnss.lat), "lon_deg": np.degrees(gnss.lon)}
+    beside = path.with_suffix(".gps.csv")
+    pd.DataFrame({**rows, "height_m": gnss.height}).to_csv(beside, index=False)
+    return path
+
+
+@pytest.fixture(scope="module")
+def drive(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write(tmp_path_factory.mktemp("info") / "drive.csv", mount=(0.0, -6.0, 5.0))
+
+
+def test_one_screen_with_the_evidence(drive) -> None:
+    done = vehnav("info", drive)
+    assert done.exit_code == 0, done.output
+    lines = done.stdout.splitlines()
+    assert len(lines) <= 24  # a terminal
+    text = done.stdout
+    for part in (
+        "8000 declared, 8000 read",
+        "50.00 Hz",
+        "driven",
+        "axes       BRU, mount",
+        "units",
+    ):
+        assert part in text
+    assert "forward: 4 departures and arrivals" in text
+    assert "[axes-contradiction]" in done.stderr  # the columns were taken as FLU
+
+
+def test_json_has_what_a_ticket_needs(drive) -> None:
+    done = vehnav("info", drive, "--json")
+    found = json.loads(done.stdout)
+    assert found["version"] == 1
+    assert found["navigable"] is True
+    assert found["axes"]["axes"] == "BRU"
+    assert found["axes"]["mount_deg"] == pytest.approx([0.0, -6.0, 5.0], abs=1.0)
+    assert found["axes"]["evidence"]["events"] == 4
+    assert found["imu"]["count"] == 8000
+    assert found["imu"]["rate_hz"] == pytest.approx(50.0)
+    # 12 and 15 m/s at the top of sin^2 over 40 and 60 s: half of it on the mean
+    assert found["gps"]["distance_m"] == pytest.approx(12.0 * 20.0 + 15.0 * 30.0, rel=0.01)
+    ends = [(s["start_s"], s["end_s"]) for s in found["stops"]]
+    # a stop begins at 0.2 m/s, which sin^2 has 2.2 s before it ends
+    true = np.array([[0.0, 20.0], [60.0, 80.0], [140.0, 160.0]])
+    assert np.array(ends) == pytest.approx(true, abs=2.5)
+    assert found["units"]["accel"] == "m/s2"
+
+
+def test_a_calibration_serves_another_log_of_the_same_car(drive, tmp_path) -> None:
+    """The second log has one stop and no departure: by itself it does not show forward."""
+    car = tmp_path / "car.toml"
+    assert vehnav("info", drive, "--save-calibration", car).exit_code == 0
+    saved = tomllib.loads(car.read_text(encoding="utf-8"))["input"]
+    assert saved["axes"] == "BRU"
+    assert saved["mount"] == pytest.approx([0.0, -6.0, 5.0], abs=1.0)
+    short = write(tmp_path / "short.csv", mount=(0.0, -6.0, 5.0), seconds=18.0)
+    alone = json.loads(vehnav("info", short, "--json").stdout)
+    assert alone["axes"]["evidence"]["certain"] is False
+    with_it = json.loads(vehnav("info", short, "--calibration", car, "--json").stdout)
+    assert with_it["axes"]["axes"] == "BRU"
+    assert with_it["axes"]["mount_deg"] == pytest.approx(saved["mount"], abs=1e-12)
+    # the command line counts more
+    over = vehnav("info", short, "--calibration", car, "--axes", "FLU", "--json")
+    assert json.loads(over.stdout)["axes"]["axes"] == "FLU"
+    refused = vehnav("info", short, "--save-calibration", tmp_path / "no.toml")
+    assert refused.exit_code == 2
+    assert "no calibration" in refused.stderr
+    assert not (tmp_path / "no.toml").exists()
+
+
+def test_run_takes_the_calibration(drive, tmp_path) -> None:
+    car = tmp_path / "car.toml"
+    vehnav("info", drive, "--save-calibration", car)
+    out = tmp_path / "out"
+    done = vehnav("run", drive, "--calibration", car, "--out-dir", out, "--json")
+    assert done.exit_code == 0, done.output
+    given = json.loads(done.stdout)["input"]
+    saved = tomllib.loads(car.read_text(encoding="utf-8"))["input"]
+    assert given["axes"] == "BRU"
+    assert given["mount_deg"] == pytest.approx(saved["mount"], abs=1e-12)
+    assert "axes-contradiction" not in [f["code"] for f in given["findings"]]
+
+
+@pytest.mark.parametrize(
+    "text", ["", "[stops]\nstop_dwell = 2.0\n", "[input]\ngyro_unit = 'deg/s'\n"]
+)
+def test_what_is_no_calibration_is_refused(drive, tmp_path, text) -> None:
+    car = tmp_path / "car.toml"
+    car.write_text(text, encoding="utf-8")
+    done = vehnav("info", drive, "--calibration", car)
+    assert done.exit_code == 2
+    assert "not a calibration" in done.stderr
+
+
+def test_what_cannot_be_navigated_is_told_not_refused(tmp_path) -> None:
+    path = write(tmp_path / "roll.csv")
+    done = vehnav("info", path, "--start", "25", "--end", "55")
+    assert done.exit_code == 0
+    assert "NOT NAVIGABLE" in done.stdout
+    assert "no stop was found" in done.stdout
+    gone = vehnav("info", tmp_path / "missing.csv")
+    assert gone.exit_code == 2
+
+
+# ---- check -------------------------------------------------------------------------------------
+
+
+def test_check_of_a_sound_log(tmp_path) -> None:
+    path = write(tmp_path / "good.csv", letters="FLU")
+    done = vehnav("check", path, "--strict")
+    assert done.exit_code == 0, done.output
+    assert "8000 declared, 8000 read, 0 recovered, 0 unverified, 0 bad" in done.stdout
+    assert "sound: 0 errors, 0 warnings" in done.stdout
+
+
+def test_check_names_a_hole_and_strict_makes_it_count(tmp_path) -> None:
+    path = write(tmp_path / "hole.csv", letters="FLU")
+    rows = pd.read_csv(path)
+    t = (rows.t_ns - rows.t_ns[0]) * 1e-9
+    rows[(t < 100.0) | (t > 103.0)].to_csv(path, index=False)
+    done = vehnav("check", path)
+    assert done.exit_code == 0
+    assert "warning: [gap] 100.0-103.0 s" in done.stdout
+    assert vehnav("check", path, "--strict").exit_code == 1
+    found = json.loads(vehnav("check", path, "--json").stdout)
+    (gap,) = [f for f in found["findings"] if f["code"] == "gap"]
+    assert gap["level"] == "warning"
+    assert gap["start_s"] == pytest.approx(100.0, abs=0.03)
+
+
+def test_check_of_a_damaged_recording_leaves_with_3(sample_logs, tmp_path) -> None:
+    whole = (sample_logs / "city.mcap").read_bytes()
+    cut = tmp_path / "cut.mcap"
+    cut.write_bytes(whole[: len(whole) * 2 // 3])
+    done = vehnav("check", cut)
+    assert done.exit_code == 3, done.output
+    assert "damaged: " in done.stdout
+    assert "error: " in done.stdout
+    counts = json.loads(vehnav("check", cut, "--json").stdout)["integrity"]
+    assert counts["damaged"] is True
+    assert counts["read"] > 0
+    assert vehnav("check", cut, "--strict").exit_code == 1
+
+
+def test_check_of_what_holds_no_recording(tmp_path) -> None:
+    empty = tmp_path / "empty.mcap"
+    empty.write_bytes(b"")
+    done = vehnav("check", empty)
+    assert done.exit_code == 2
+    assert "0 bytes" in done.stderr

@@ -1,0 +1,64 @@
+"""``vehnav check``: what is wrong with a log; repairs nothing, loses nothing."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from vehnav.cli.common import (
+    axes_options,
+    command,
+    finding_line,
+    finish,
+    input_options,
+    json_option,
+    print_json,
+    progress,
+    span_options,
+    stops_options,
+    strict_option,
+)
+
+if TYPE_CHECKING:
+    from vehnav.logs.log import ReadOptions
+
+
+@command(
+    "check",
+    examples=["vehnav check city.mcap", "vehnav check city.mcap --strict --json"],
+)
+@click.argument("log")
+@input_options
+@span_options
+@axes_options
+@stops_options
+@json_option
+@strict_option
+def check(log: str, read_options: ReadOptions, as_json: bool, strict: bool, **options: Any) -> None:
+    """Tell what is wrong with a log: findings only.
+
+    Counts what was declared, read, recovered, read from parts that cannot be trusted (unverified)
+    and unusable (bad); then every finding of reading it, of its clocks, units, axes and gaps.
+    Exit status 3 if data was lost, recovered or unverified; 1 with --strict and any warning.
+    """
+    from vehnav.cli.run import config_from
+    from vehnav.logs.read import read_log
+    from vehnav.report.document import finding_rows
+    from vehnav.report.inspection import COUNTS, inspect_log, integrity
+
+    with progress(f"{log}: reading", quiet=as_json):
+        recording = read_log(log, read_options)
+    inspection = inspect_log(recording, config_from(recording, options))
+    counts, findings = integrity(recording), inspection.findings
+    if as_json:
+        rows = finding_rows(findings, recording.start_ns)
+        print_json({"file": log, "integrity": counts, "findings": rows})
+    else:
+        click.echo(f"{log}: " + ", ".join(f"{counts[name]} {name}" for name in COUNTS))
+        for finding in findings:
+            click.echo(finding_line(finding, recording.start_ns))
+        found = [sum(f.level == level for f in findings) for level in ("error", "warning", "info")]
+        verdict = "damaged" if recording.damaged else "sound" if not sum(found[:2]) else "usable"
+        click.echo(f"{verdict}: {found[0]} errors, {found[1]} warnings, {found[2]} notes")
+    finish(damaged=recording.damaged, strict=strict, findings=findings)
