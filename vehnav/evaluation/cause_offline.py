@@ -32,6 +32,8 @@ from vehnav.units import DEG, DEG_PER_HOUR
 Array = npt.NDArray[np.float64]
 TimeArray = npt.NDArray[np.int64]
 
+GRAVITY: Final = 9.81
+"""m/s2; its part along a slope is all that matters here."""
 SHAPES: Final = (1.0, 0.5, 0.25)
 """Sigmas of the three shapes of a leg's error over :func:`leg_sigma`: what stays as a shift, and
 two that are gone at its end (a position between two stops is less well tied than at them)."""
@@ -42,11 +44,12 @@ def offline_design(
 ) -> Design:
     """Columns of the default method.
 
-    A heading error beta (clockwise) moves the position by ``dr_E = V_N beta``, ``dr_N = -V_E
-    beta`` a second; a gyro error about up changes it by ``d beta = -d omega_z``. An error of the
-    horizontal accelerometers in proportion to the acceleration makes a velocity error of which the
-    part found at the end of a leg was distributed over it: a forward scale is the way times the
-    scale (the velocity is zero at both ends).
+    A heading error beta (clockwise) turns what the velocity gains: ``d dV_E = beta dV_N``,
+    ``d dV_N = -beta dV_E``; a gyro error about up changes it by ``d beta = -d omega_z``. The
+    accelerometers err in proportion to the force, less the part that levelling took for tilt at
+    both ends of the leg. What is found of a velocity error at the end of a leg was distributed over
+    it linearly (:func:`tied`): a constant heading error turns the way, a forward scale stretches
+    it.
 
     Parameters
     ----------
@@ -80,8 +83,10 @@ def offline_design(
     beta[1:, bias] = -np.cumsum(moving)[:, None]
     for k, (a, b) in enumerate(legs):
         beta[:, drift.start + k] = np.clip((t - t[a]) / (t[b] - t[a]), 0.0, 1.0)
-    v_n = motion.v_n
-    rate = np.stack([v_n[:, 1, None] * beta, -v_n[:, 0, None] * beta], axis=1)
+    gained = np.diff(motion.v_n[:, :2], axis=0)
+    across = np.stack([gained[:, 1], -gained[:, 0]], axis=1)
+    middle = 0.5 * (beta[1:] + beta[:-1])
+    rate = tied(motion, legs, across[:, :, None] * middle[:, None, :])
     for columns_of, matrix in ((forward, [[0, 0], [0, 1]]), (right, [[1, 0], [0, 0]]),
                                (shear, [[0, 1], [1, 0]])):  # fmt: skip
         rate[:, :, columns_of] = velocity_errors(motion, legs, np.array(matrix, float))[:, :, None]
@@ -100,23 +105,42 @@ def offline_design(
     )  # fmt: skip
 
 
-def velocity_errors(motion: Motion, legs: list[tuple[int, int]], matrix: Array) -> Array:
-    """(g, 2) m/s: error of the velocity per unit of an accelerometer error ``matrix`` (2, 2).
+def tied(motion: Motion, legs: list[tuple[int, int]], gained: Array) -> Array:
+    """(g, 2, p) m/s: velocity errors from their increments (g-1, 2, p), zero at both ends of a leg.
 
-    The error is ``d f = matrix @ a`` with a the horizontal acceleration right and forward; what of
-    its integral is found at the end of a leg has been taken out linearly.
+    A leg without a stop at its end is left open.
+    """
+    out = np.zeros((motion.t.size, *gained.shape[1:]))
+    for a, b in legs:
+        found = np.cumsum(gained[a:b], axis=0)
+        out[a + 1 : b + 1] = found
+        if motion.stop[b] >= 0:
+            s = (motion.t[a + 1 : b + 1] - motion.t[a]) / (motion.t[b] - motion.t[a])
+            out[a + 1 : b + 1] -= s[:, None, None] * found[-1]
+    return out
+
+
+def velocity_errors(motion: Motion, legs: list[tuple[int, int]], matrix: Array) -> Array:
+    """(g, 2) m/s: velocity error per unit of an accelerometer error ``matrix`` (2, 2).
+
+    The error is ``d f = matrix @ f`` with f the specific force right and forward.
     """
     dt = np.diff(motion.t)
-    a_n = np.diff(motion.v_n[:, :2], axis=0) / dt[:, None]
-    c = 0.5 * (motion.c_nb[1:] + motion.c_nb[:-1])[:, :2, :2]
-    step = np.einsum("kij,jl,kml,km->ki", c, matrix, c, a_n) * dt[:, None]
-    out = np.zeros((motion.t.size, 2))
+    f_n = np.diff(motion.v_n, axis=0) / dt[:, None]
+    f_n[:, 2] += GRAVITY
+    c = 0.5 * (motion.c_nb[1:] + motion.c_nb[:-1])[:, :, :2]
+    error = np.einsum("kij,jl,kml,km->ki", c, matrix, c, f_n)[:, :2]
     for a, b in legs:
-        found = np.cumsum(step[a:b], axis=0)
-        s = (motion.t[a + 1 : b + 1] - motion.t[a]) / (motion.t[b] - motion.t[a])
-        at_stop = motion.stop[b] >= 0
-        out[a + 1 : b + 1] = found - (s[:, None] * found[-1] if at_stop else 0.0)
-    return out
+        first = _level_error(motion.c_nb[a], matrix)
+        last = _level_error(motion.c_nb[b], matrix) if motion.stop[b] >= 0 else first
+        s = (0.5 * (motion.t[a:b] + motion.t[a + 1 : b + 1]) - motion.t[a])[:, None]
+        error[a:b] -= first + s / (motion.t[b] - motion.t[a]) * (last - first)
+    return tied(motion, legs, (error * dt[:, None])[:, :, None])[:, :, 0]
+
+
+def _level_error(c_nb: Array, matrix: Array) -> Array:
+    """(2,) m/s2: error of the level force at rest, which levelling takes for tilt."""
+    return np.asarray(c_nb[:2, :2] @ matrix @ (GRAVITY * c_nb[2, :2]))
 
 
 def _shapes(s: Array) -> tuple[Array, Array, Array]:

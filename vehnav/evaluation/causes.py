@@ -101,8 +101,10 @@ class Cause:
 
     @property
     def significant(self) -> bool:
-        """Whether the value is told from zero by two sigma (pieces of noise: never)."""
-        return self.single and abs(self.value) > 2.0 * self.sigma
+        """Whether the value, or the share of noise in pieces, is told from zero by two sigma."""
+        if not self.single:
+            return self.share > 2.0 * self.share_sigma
+        return self.seen and abs(self.value) > 2.0 * self.sigma
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for the report."""
