@@ -202,3 +202,17 @@ def test_in_a_browser_the_cursor_names_every_error(three: Comparison, tmp_path: 
             hidden = "document.querySelector('.map path.c-free').classList.contains('hidden')"
             assert browser.run(hidden)
         assert browser.complaints == []
+
+
+def test_long_names_stay_inside_a_phone(tmp_path: Path) -> None:
+    program = find_browser()
+    if program is None:
+        pytest.skip("no browser is installed")
+    names = [f"{k * 30}.csv" for k in ("drive_", "w" * 4, "a b ")]
+    item = made({name: _moved(5.0 * k, 0.0) for k, name in enumerate(names)})
+    path = tmp_path / "all.html"
+    path.write_text(render_comparison(item, command="vehnav compare"), encoding="utf-8")
+    assert all(name in Page(path.read_text(encoding="utf-8")).text for name in names)
+    with Browser(program, tmp_path / "profile") as browser:
+        browser.open(path, width=390)
+        assert browser.run("document.documentElement.scrollWidth") <= 390

@@ -23,7 +23,7 @@ from vehnav.report.markup import esc
 from vehnav.report.sections import command_line
 from vehnav.report.svg import HEIGHT, WIDTH, group_label
 
-VOID = {"meta", "link", "input", "br", "img", "hr"}
+VOID = {"meta", "link", "input", "br", "img", "hr", "wbr"}
 NASTY = "<img src=x onerror=alert(1)>\"'&</script><!--" + chr(0x202E)
 
 

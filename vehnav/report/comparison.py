@@ -35,6 +35,8 @@ READABLE: Final = 5.0
 """Times the largest error of the next better trajectory that a curve may stretch the axis."""
 SMALL: Final = 0.02
 """Of the distance driven: an error below it is always shown whole."""
+LONGEST: Final = 28
+"""Characters of a name in legends; of a longer one the ends are kept."""
 AROUND: Final = 0.5
 """Of the reference's extent that trajectories may add to the map on each side."""
 
@@ -137,6 +139,8 @@ def short_names(paths: Sequence[str]) -> list[str]:
     ['a.csv', 'b.tum']
     >>> short_names(["out/city.vehnav/trajectory.csv", "out/free.vehnav/trajectory.csv"])
     ['city.vehnav', 'free.vehnav']
+    >>> short_names(["drive_of_the_12th_with_the_new_sensor.csv"])
+    ['drive_of_the_…new_sensor.csv']
     >>> short_names(["a.csv", "a.csv"])
     ['a.csv', 'a.csv (2)']
     """
@@ -153,7 +157,9 @@ def short_names(paths: Sequence[str]) -> list[str]:
         last = ["/".join(p[head : len(p) - tail] or p[-1:]) for p in parts]
     seen: Counter[str] = Counter()
     names = []
-    for name in last:
+    for whole in last:
+        half = (LONGEST - 1) // 2
+        name = whole if len(whole) <= LONGEST else f"{whole[:half]}…{whole[half + 1 - LONGEST :]}"
         seen[name] += 1
         names.append(name if seen[name] == 1 else f"{name} ({seen[name]})")
     return names

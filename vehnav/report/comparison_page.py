@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, Final
@@ -195,8 +196,15 @@ def _moved(errors: Errors) -> str:
 
 def _by_entry(item: Comparison, title: str, rows: Sequence[Sequence[str]]) -> str:
     """Rows of a name (text) and a cell (markup) for each trajectory."""
-    heads = [f'<i class="swatch k-{entry.role}"></i>{esc(entry.name)}' for entry in item.entries]
+    heads = [
+        f'<i class="swatch k-{entry.role}"></i>{_breakable(entry.name)}' for entry in item.entries
+    ]
     return table(["", *heads], [[esc(row[0]), *row[1:]] for row in rows], name=title)
+
+
+def _breakable(name: str) -> str:
+    """A name as markup that may break after its separators."""
+    return "".join(f"{esc(part)}<wbr>" for part in re.split(r"(?<=[/_.-])", name) if part)
 
 
 def _row(item: Comparison, title: str, values: Sequence[float | None]) -> list[str]:

@@ -34,6 +34,10 @@ STANDING: Final = "#e4e6ea"
 WIDTH: Final = 6.3
 """inch: the text width of A4."""
 DPI: Final = 160
+LONG: Final = 20
+"""Characters of a name from which a legend has only as many columns as fit."""
+PER_INCH: Final = 18.0
+"""Characters of a legend."""
 STYLE: Final = {
     "font.size": 8.5, "axes.linewidth": 0.6, "lines.linewidth": 1.1, "legend.frameon": False,
     "legend.fontsize": 7.5, "pdf.fonttype": 42, "svg.fonttype": "none", "axes.axisbelow": True,
@@ -196,9 +200,14 @@ def _draw_panel(axes: Axes, item: Panel, *, explained: bool = True) -> None:
 
 
 def _legend(axes: Axes) -> None:
+    labels = axes.get_legend_handles_labels()[1]
+    longest, columns = max(map(len, labels), default=0), 5
+    if longest > LONG:
+        inches = axes.bbox.width / axes.figure.dpi
+        columns = max(2, int(inches * PER_INCH / (longest + 5)))
     axes.legend(
-        loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=5, borderaxespad=0.2, borderpad=0.2,
-        columnspacing=1.0, handlelength=1.3, handletextpad=0.5,
+        loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=columns, borderaxespad=0.2,
+        borderpad=0.2, columnspacing=1.0, handlelength=1.3, handletextpad=0.5,
     )  # fmt: skip
 
 
