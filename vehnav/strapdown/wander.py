@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from vehnav.corrections import levelling_rate, velocity_reset
-from vehnav.earth import WGS84, Ellipsoid, c_en, normal_gravity
+from vehnav.earth import WGS84, Ellipsoid, normal_gravity
 from vehnav.kernel import entry_kernel, kernel
 from vehnav.rotation import Mat3, Vec3, add, cross, mat_vec, scale
 from vehnav.strapdown.body_step import (
@@ -28,6 +28,9 @@ from vehnav.strapdown.body_step import (
 )
 from vehnav.strapdown.enu import attitude_update, held_velocity, unfelt_acceleration
 from vehnav.strapdown.increments import Increments
+from vehnav.strapdown.place import c_nw as c_nw
+from vehnav.strapdown.place import c_we_from_geodetic as c_we_from_geodetic
+from vehnav.strapdown.place import geodetic_from_c_we as geodetic_from_c_we
 from vehnav.strapdown.solution import Solution, StopControl
 
 Array = npt.NDArray[np.float64]
@@ -254,34 +257,7 @@ def integrate_wander(
             out[3][k, j] = c_wb[j]
 
 
-# ---- place and axes ----------------------------------------------------------------------------
-
-
-def c_nw(wander: npt.ArrayLike) -> Array:
-    """(..., 3, 3): turns wander axes into East-North-Up, the transpose of A(epsilon) (3)."""
-    s, c = np.sin(np.asarray(wander, float)), np.cos(np.asarray(wander, float))
-    zero, one = np.zeros_like(s), np.ones_like(s)
-    rows = [[c, -s, zero], [s, c, zero], [zero, zero, one]]
-    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
-
-
-def c_we_from_geodetic(
-    lat: npt.ArrayLike, lon: npt.ArrayLike, wander: npt.ArrayLike = 0.0
-) -> Array:
-    """C_we = A(epsilon) B_0 (..., 3, 3) of latitude, longitude and wander angle, rad (3)."""
-    lat, lon, wander = np.broadcast_arrays(*(np.asarray(x, float) for x in (lat, lon, wander)))
-    return np.asarray(np.swapaxes(c_en(lat, lon) @ c_nw(wander), -1, -2))
-
-
-def geodetic_from_c_we(c_we: npt.ArrayLike) -> tuple[Array, Array, Array]:
-    """(lat, lon, wander angle), rad, of C_we (..., 3, 3) (24); at a pole lon and wander are 0/pi.
-
-    ``lon + wander`` (north) alone is defined there; their sum stays right.
-    """
-    b = np.asarray(c_we, float)
-    b13, b23, b33 = b[..., 0, 2], b[..., 1, 2], b[..., 2, 2]
-    b31, b32 = b[..., 2, 0], b[..., 2, 1]
-    return np.arctan2(b33, np.hypot(b13, b23)), np.arctan2(b32, b31), np.arctan2(b13, b23)
+# ---- the result --------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
