@@ -142,6 +142,7 @@ OFFLINE = {
     "accel-scale-right": (0.003, 0.2),
 }
 """Size of the error, and to what share of its effect the simple model has to be right."""
+SLOW = ("gyro-scale-up", "accel-scale-right")
 
 
 @pytest.fixture(scope="module")
@@ -151,7 +152,9 @@ def mems() -> tuple[SimulatedLog, Trajectory]:
     return made, wrong_run(made).trajectory
 
 
-@pytest.mark.parametrize("name", OFFLINE)
+@pytest.mark.parametrize(
+    "name", ["heading", "accel-scale", *(pytest.param(x, marks=pytest.mark.slow) for x in SLOW)]
+)
 def test_responses_of_the_offline_solution(mems, name: str) -> None:
     """The same with whole runs by the default method, the noise equal in both."""
     made, true = mems
