@@ -160,7 +160,8 @@ def establish_axes(
     rest = at_rest(t, gyro, accel, stops)
     events = departures_and_arrivals(t, gyro, accel, stops)
     turned = turns(t, gyro, accel, rest, stops)
-    clue = _gps_clue(t, gyro, accel, rest, stops, gps, gps_seconds)
+    decided = events.consistency >= FAIR and events.speed >= EVENT_SPEED
+    clue = _gps_clue(t, gyro, accel, rest, stops, gps, gps_seconds, grow=not decided)
     inverted = clue is not None and clue.parity < 0.0 and clue.mirrored
     forward, source = _forward(events, turned, clue)
     sign = -1.0 if inverted else 1.0
@@ -199,10 +200,14 @@ def _gps_clue(
     stops: list[Stop],
     gps: GpsBetween | None,
     seconds: float,
+    *,
+    grow: bool,
 ) -> GpsClue | None:
     """GPS over the stretch after the first departure, grown until it compares the signs of turns.
 
-    The stretch begins at the first stop: fixes before it judge the part integrated backward.
+    It grows only where departures and arrivals do not show forward: the fixes beyond the window
+    of the heading judge the track, and are not looked at without need. The stretch begins at the
+    first stop: fixes before it judge the part integrated backward.
     """
     if gps is None:
         return None
@@ -214,7 +219,7 @@ def _gps_clue(
             clue = by_gps(t, gyro, accel, rest, motion) or clue
         if clue is not None and clue.turning >= MIN_TURNING and abs(clue.parity) >= PARITY:
             return clue
-        if departure + seconds >= t[-1]:
+        if not grow or departure + seconds >= t[-1]:
             return clue
         seconds += GROW
 
