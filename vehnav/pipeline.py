@@ -216,6 +216,29 @@ def _run_filter(drive: Drive, log: Log, config: Config, samples: Samples) -> Run
     )  # fmt: skip
 
 
+def run_at_found_offset(log: Log, config: Config = DEFAULTS) -> Run:
+    """As :func:`run`, with the delay of the GPS taken out that the track shows.
+
+    One number is fitted to the fixes that judge, and said so: it is on request only.
+    """
+    first = run(log, config)
+    found = None if first.errors is None else first.errors.found_offset
+    if found is None or log.gnss is None:
+        text = "the delay of the GPS cannot be told from the motion: its stamps were left alone"
+        unknown = Finding("gps-offset-unknown", "warning", text)
+        return replace(first, findings=(*first.findings, unknown))
+    shifted = replace(log.gnss, t_ns=log.gnss.t_ns + np.int64(round(found.offset / NS)))
+    total = log.gps_time_offset + found.offset
+    second = run(replace(log, gnss=shifted, gps_time_offset=total), config)
+    text = (
+        f"{found.offset:+.2f} +- {found.sigma:.2f} s were added to the stamps of the GPS, as the "
+        "motion says; that one number comes from the fixes that judge"
+    )
+    said = Finding("gps-offset-applied", "info", text)
+    use = replace(second.gps, used_for=(*second.gps.used_for, "time offset"))
+    return replace(second, gps=use, findings=(*second.findings, said))
+
+
 def search_stops(log: Log, config: Config = DEFAULTS) -> StopSearch:
     """The stops of a log, with the samples they were found in. LogError as :func:`run`."""
     samples, rule = _samples(log, config), stop_rule(config)

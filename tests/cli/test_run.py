@@ -176,6 +176,26 @@ def test_a_sensor_weighs_the_stops_and_sets_their_threshold(drive, tmp_path) -> 
     assert vehnav("run", drive, "--sensor", "nonsense", "--out-dir", tmp_path).exit_code == 2
 
 
+def test_the_delay_of_the_gps_is_taken_out_on_request(sample_logs, tmp_path) -> None:
+    """Fixes stamped 0.8 s late: the track says so, auto takes it out and says what it used."""
+    late = pd.read_csv(sample_logs / "city.gps.csv")
+    late["t_ns"] += 800_000_000
+    late.to_csv(tmp_path / "late.csv", index=False)
+    common = ("run", sample_logs / "city.csv", "--gps-file", tmp_path / "late.csv", "--json")
+    plain = json.loads(vehnav(*common, "--out-dir", tmp_path / "a").stdout)
+    auto = json.loads(
+        vehnav(*common, "--gps-time-offset", "auto", "--out-dir", tmp_path / "b").stdout
+    )
+    assert "gps-delay" in {f["code"] for f in plain["input"]["findings"]}
+    assert plain["gps"]["offset_s"] == 0.0
+    assert auto["gps"]["offset_s"] == pytest.approx(-0.8, abs=0.2)
+    assert auto["gps"]["used_for"] == ["position", "heading", "time offset"]
+    jsonschema.validate(auto, schema())
+    refused = vehnav("stops", sample_logs / "city.csv", "--gps-time-offset", "auto")
+    assert refused.exit_code == 2
+    assert "needs a track" in refused.stderr
+
+
 # ---- bad input ---------------------------------------------------------------------------------
 
 

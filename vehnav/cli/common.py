@@ -29,12 +29,6 @@ from typing import Any, NoReturn
 import click
 
 from vehnav.cli.options import (
-    AxesType,
-    Instant,
-    InstantType,
-    NumbersType,
-    NumberType,
-    PairsType,
     axes_options,
     input_options,
     json_option,
@@ -46,6 +40,7 @@ from vehnav.cli.options import (
 )
 from vehnav.cli.settings import config_in_force, load_config, render_config
 from vehnav.cli.status import exit_status
+from vehnav.cli.types import AxesType, Instant, InstantType, NumbersType, NumberType, PairsType
 from vehnav.errors import Finding, Level
 
 __all__ = [

@@ -23,7 +23,7 @@ from vehnav.cli.common import (
     strict_option,
 )
 from vehnav.cli.compare_screen import screen
-from vehnav.cli.options import ParamType
+from vehnav.cli.types import OffsetType, ParamType
 from vehnav.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -32,19 +32,6 @@ if TYPE_CHECKING:
     from vehnav.errors import Finding
     from vehnav.evaluation import Errors
     from vehnav.export.load import Track
-
-
-class OffsetType(ParamType):
-    """Seconds, or ``auto``."""
-
-    name = "S|auto"
-
-    def convert(self, value: Any, param: Any, ctx: Any) -> float | str:
-        """Read a finite number or the word."""
-        if value == "auto":
-            return "auto"
-        number: float = NumberType().convert(value, param, ctx)
-        return number
 
 
 class SpanType(ParamType):

@@ -28,7 +28,7 @@ from vehnav.cli.common import (
     stops_options,
     strict_option,
 )
-from vehnav.cli.options import ParamType
+from vehnav.cli.types import ParamType
 from vehnav.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -221,7 +221,11 @@ def _results(
     """The runs of a log with the folder of each: one, or one per part with ``--split``."""
     from vehnav.logs.read import read_log
     from vehnav.pipeline import run as run_log
+    from vehnav.pipeline import run_at_found_offset
     from vehnav.prepare import split_log
+
+    if click.get_current_context().meta.get("vehnav.offset_auto"):
+        run_log = run_at_found_offset
 
     with progress(f"{path}: reading", quiet=quiet):
         log = read_log(path, read_options)

@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 import click
 
 from vehnav.cli.common import NumberType
-from vehnav.cli.options import ParamType
+from vehnav.cli.types import ParamType
 
 F = TypeVar("F", bound=Callable[..., Any])
 
