@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Final, Literal
+from typing import Any, Final, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -227,14 +227,20 @@ def dead_reckon(
     extra = np.zeros(3) if accel_bias is None else accel_bias
     increments = drive.increments.corrected(per_step, start.accel_bias + extra)
     control = stop_control(drive, levelling=levelling, reset=reset)
-    return MECHANIZATIONS[drive.frame](
+    return mechanize(
+        drive,
         increments.part(drive.first, last),
         position=start.position,
         v_n=start.v_n,
         c_nb=start.c_nb,
         control=control.part(drive.first, last),
-        vertical=drive.vertical,
-        earth=drive.earth,
+    )
+
+
+def mechanize(drive: Drive, increments: Increments, **start: Any) -> Solution:
+    """Integrate in the frame of the drive; ``start`` as of the mechanizations."""
+    return MECHANIZATIONS[drive.frame](
+        increments, vertical=drive.vertical, earth=drive.earth, **start
     )
 
 

@@ -16,7 +16,6 @@ import numpy.typing as npt
 
 from vehnav.alignment import Rest
 from vehnav.classic import (
-    MECHANIZATIONS,
     Corrections,
     Drive,
     Outcome,
@@ -24,6 +23,7 @@ from vehnav.classic import (
     bias_per_step,
     biases_at_stops,
     dead_reckon,
+    mechanize,
     rest_of,
     stop_records,
 )
@@ -291,13 +291,12 @@ def with_part_before(
         return outcome
     extra = np.zeros(3) if outcome.accel_bias is None else outcome.accel_bias
     increments = drive.increments.corrected(bias, start.accel_bias + extra)
-    back = MECHANIZATIONS[drive.frame](
+    back = mechanize(
+        drive,
         increments.part(0, k0).reversed(),
         position=start.position,
         v_n=start.v_n,
         c_nb=outcome.c_nb[0],
-        vertical=drive.vertical,
-        earth=drive.earth,
     )
     before = slice(None, 0, -1)  # reversed again, without the instant that both have
     sigma_pos, sigma_heading = outcome.sigma_pos, outcome.sigma_heading

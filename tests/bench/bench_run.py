@@ -21,12 +21,13 @@ STEPS = {
     "read": ["vehnav.logs.read:read_log"],
     "prepare": ["vehnav.prepare:prepare_samples"],
     "stops": ["vehnav.stops:stop_statistics", "vehnav.stops:stops_from_statistics"],
-    "integrate": ["vehnav.strapdown.enu:mechanize_enu"],
+    "integrate": ["vehnav.classic:mechanize"],
     "correct": ["vehnav.offline:run_stops"],
     "errors": ["vehnav.evaluation:compare"],
     "write": [
         "vehnav.export.formats:write_trajectory",
         "vehnav.report.document:write_document",
+        "vehnav.report.html:write_html",
     ],
 }
 """Step -> functions whose time it is, without that of other steps inside them."""
