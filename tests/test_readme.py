@@ -42,6 +42,20 @@ def test_every_command_is_in_the_readme_and_every_one_there_exists() -> None:
     assert listed <= set(COMMANDS)
 
 
+@pytest.mark.slow
+def test_the_table_of_the_papers_is_what_the_command_prints() -> None:
+    """Verdicts to the letter, figures to the printed digits of another platform's libm."""
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    shown = [line for line in text.splitlines() if re.match(r"\| (000|001|002|003|004|all) ", line)]
+    result = CliRunner().invoke(cli, ["papers", "--fast", "--markdown"])
+    printed = [x for x in result.stdout.splitlines() if re.match(r"\| (00\d|all) ", x)]
+    assert len(shown) == len(printed) > 15
+    for ours, theirs in zip(printed, shown, strict=True):
+        assert NUMBER.sub("#", ours) == NUMBER.sub("#", theirs)
+        numbers = [[float(x) for x in NUMBER.findall(line)] for line in (ours, theirs)]
+        assert numbers[0] == pytest.approx(numbers[1], rel=0.02, abs=0.11)
+
+
 def test_named_files_exist() -> None:
     text = (ROOT / "README.md").read_text(encoding="utf-8")
     named = set(re.findall(r"(?<![.\w])((?:vehnav|tests|sample_logs)/[\w./]+\.\w+)", text))
