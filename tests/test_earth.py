@@ -21,6 +21,7 @@ from vehnav.earth import (
     local_enu,
     normal_gravity,
     position_difference,
+    radii,
     transport_rate,
 )
 
@@ -312,3 +313,11 @@ def test_position_difference_at_height() -> None:
     assert got[0, 0] < 0 < got[0, 1]
     assert position_difference(0.1, 0.2, 0.1, 0.2).tolist() == [0.0, 0.0]
     assert position_difference(np.zeros((4, 5)), 0.0, 0.0, 0.0).shape == (4, 5, 2)
+
+
+def test_radii_of_arrays_are_those_of_the_kernel() -> None:
+    lat, h = np.radians([-90.0, -33.0, 0.0, 47.2, 89.9]), np.array([0.0, 100.0, -50.0, 3e3, 1e4])
+    expected = np.array(
+        [curvature_radii(float(a), float(b), WGS84) for a, b in zip(lat, h, strict=True)]
+    )
+    np.testing.assert_allclose(np.stack(radii(lat, h), axis=1), expected, rtol=1e-15)

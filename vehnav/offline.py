@@ -27,7 +27,7 @@ from vehnav.classic import (
     rest_of,
     stop_records,
 )
-from vehnav.earth import Ellipsoid, normal_gravity
+from vehnav.earth import Ellipsoid, normal_gravity, radii
 from vehnav.expected import ExpectedErrors
 from vehnav.legs import (
     PSI,
@@ -216,18 +216,12 @@ def integrate_position(
     lat = np.full(t.size, position[0])
     for _ in range(2):  # the radius changes by 1e-6 a kilometre: one repetition is exact
         middle = 0.5 * (lat[1:] + lat[:-1])
-        radius_m, radius_n = _radii(middle, height[1:], earth)
+        radius_m, radius_n = radii(middle, height[1:], earth=earth)
         lat = position[0] + np.concatenate([[0.0], np.cumsum(step[:, 1] / radius_m)])
     middle = 0.5 * (lat[1:] + lat[:-1])
     d_lon = step[:, 0] / (radius_n * np.cos(middle))
     lon = position[1] + np.concatenate([[0.0], np.cumsum(d_lon)])
     return np.stack([lat, lon, height], axis=1)
-
-
-def _radii(lat: Array, h: Array, earth: Ellipsoid) -> tuple[Array, Array]:
-    w2 = 1.0 - earth.e2 * np.sin(lat) ** 2
-    radius_n = earth.a / np.sqrt(w2)
-    return radius_n * (1.0 - earth.e2) / w2 + h, radius_n + h
 
 
 # ---- expected errors ---------------------------------------------------------------------------

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from vehnav.earth import WGS84, Ellipsoid, local_enu
+from vehnav.earth import WGS84, Ellipsoid, local_enu, radii
 from vehnav.rotation import c_from_quaternion, quaternion_from_c
 from vehnav.units import NS
 
@@ -90,14 +90,12 @@ def interpolate_positions(trajectory: Trajectory, t_ns: TimeArray) -> tuple[Arra
     h = (trajectory.t_ns[k + 1] - trajectory.t_ns[k]) * NS
     s = (t_ns - trajectory.t_ns[k]) * NS / h
     lat0 = trajectory.lat[k]
-    r_n = WGS84.a / np.sqrt(1.0 - WGS84.e2 * np.sin(lat0) ** 2)
-    r_m = r_n * (1.0 - WGS84.e2) / (1.0 - WGS84.e2 * np.sin(lat0) ** 2)
     v0, v1 = trajectory.v_n[k], trajectory.v_n[k + 1]
     h00, h10 = (1.0 + 2.0 * s) * (1.0 - s) ** 2, s * (1.0 - s) ** 2
     h01, h11 = s * s * (3.0 - 2.0 * s), s * s * (s - 1.0)
 
-    r_lat = r_m + trajectory.height[k]
-    r_lon = (r_n + trajectory.height[k]) * np.cos(lat0)
+    r_lat, r_n = radii(lat0, trajectory.height[k])
+    r_lon = r_n * np.cos(lat0)
 
     def hermite(x0: Array, x1: Array, d0: Array, d1: Array) -> Array:
         return np.asarray(h00 * x0 + h10 * h * d0 + h01 * x1 + h11 * h * d1)

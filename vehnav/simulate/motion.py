@@ -13,7 +13,7 @@ from typing import Literal, Protocol
 import numpy as np
 import numpy.typing as npt
 
-from vehnav.earth import WGS84, Ellipsoid, c_en
+from vehnav.earth import WGS84, Ellipsoid, c_en, radii
 from vehnav.rotation import c_nb_from_angles
 from vehnav.simulate.program import Program, ProgramState
 from vehnav.simulate.vibration import Tones
@@ -375,8 +375,5 @@ def to_axes(c: Array, x: Array) -> Array:
 
 def transport_rates(lat: Array, height: Array, v_n: Array, *, earth: Ellipsoid) -> Array:
     """omega_en_n (n, 3), rad/s: the ENU frame turns because the vehicle moves (004, 001 eq. 1)."""
-    w2 = 1.0 - earth.e2 * np.sin(lat) ** 2
-    radius = earth.a / np.sqrt(w2)
-    r_m = radius * (1.0 - earth.e2) / w2 + height
-    r_n = radius + height
+    r_m, r_n = radii(lat, height, earth=earth)
     return np.stack([-v_n[:, 1] / r_m, v_n[:, 0] / r_n, v_n[:, 0] * np.tan(lat) / r_n], axis=-1)

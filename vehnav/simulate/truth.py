@@ -17,7 +17,7 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from vehnav.earth import Ellipsoid, c_en, ecef_from_geodetic
+from vehnav.earth import Ellipsoid, c_en, ecef_from_geodetic, radii
 from vehnav.simulate.motion import Course, Motion, Prepared, to_axes
 
 Array = npt.NDArray[np.float64]
@@ -173,22 +173,15 @@ def _places(
     height = _integral(v[:, 2], h, start[2])
     lat_nodes = np.full(len(v), start[0])
     while True:  # the radii hang on the latitude by e^2: each turn gains three digits or more
-        r_m, _ = _radii(lat_nodes, height[1], earth=motion.earth)
+        r_m, _ = radii(lat_nodes, height[1], earth=motion.earth)
         lat = _integral(v[:, 1] / r_m, h, start[0])
         moved = float(np.max(np.abs(lat[1] - lat_nodes)))
         lat_nodes = lat[1]
         if moved < 1e-14:
             break
-    _, r_n = _radii(lat_nodes, height[1], earth=motion.earth)
+    _, r_n = radii(lat_nodes, height[1], earth=motion.earth)
     lon = _integral(v[:, 0] / (r_n * np.cos(lat_nodes)), h, start[1])
     return (lat[0], lon[0], height[0]), (lat[1], lon[1], height[1])
-
-
-def _radii(lat: Array, height: Array, *, earth: Ellipsoid) -> tuple[Array, Array]:
-    """(R_M + h, R_N + h), m, of arrays (paper 004 eq. 7)."""
-    w2 = 1.0 - earth.e2 * np.sin(lat) ** 2
-    r_n = earth.a / np.sqrt(w2)
-    return r_n * (1.0 - earth.e2) / w2 + height, r_n + height
 
 
 def _integral(rate: Array, h: Array, start: float) -> tuple[Array, Array]:
