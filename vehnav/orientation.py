@@ -14,7 +14,7 @@ from vehnav.errors import Finding, LogError
 from vehnav.logs.log import Imu
 from vehnav.mounting import gravity_contradiction, sensor_to_body
 from vehnav.mounting_auto import AxesEvidence, establish_axes
-from vehnav.stops import StopRule, find_stops
+from vehnav.stops import Stop
 from vehnav.units import DEG
 from vehnav.units_auto import Units, establish_units
 
@@ -143,11 +143,11 @@ def orient(
     t: Array,
     gyro: Array,
     accel: Array,
+    stops: list[Stop],
     declared: Declared,
     *,
     path: str,
     units: Units | None,
-    rule: StopRule,
     gps: GpsBetween | None,
     gps_seconds: float,
 ) -> Orientation:
@@ -161,10 +161,11 @@ def orient(
         s
     gyro, accel : (n, 3)
         rad/s and m/s2, sensor axes.
+    stops : list of Stop
+        That the evidence rests on.
+    declared : Declared
     units : Units or None
         Of the numbers as read.
-    rule : StopRule
-        Finds the stops that the evidence rests on.
     gps : callable or None
         See :func:`vehnav.mounting_auto.establish_axes`.
 
@@ -173,7 +174,6 @@ def orient(
     LogError
         Gravity contradicts the axes that the format declares, and nothing shows the true ones.
     """
-    stops = find_stops(t, gyro, accel, rule)
     evidence = establish_axes(
         t, gyro, accel, stops, declared=imu.axes, gps=gps, gps_seconds=gps_seconds
     )

@@ -42,15 +42,14 @@ from vehnav.logs.log import Gnss, Log
 from vehnav.logs.restamp import even_stamps
 from vehnav.offline import run_stops
 from vehnav.orientation import Declared, Orientation
+from vehnav.polar import polar_findings, with_coordinates
 from vehnav.prepare import Samples, prepare_samples, usable_imu
 from vehnav.start import Alignment, GpsUse, find_start
 from vehnav.stops import (
     Stop,
     StopRule,
     StopStatistics,
-    stop_statistics,
     stopped_mask,
-    stops_from_statistics,
 )
 from vehnav.trajectory import Trajectory
 from vehnav.units import DEG, NS
@@ -171,7 +170,9 @@ def run(log: Log, config: Config = DEFAULTS) -> Run:
         stops,
         ELLIPSOIDS[config.ellipsoid],
         config.vertical,
-        config.frame,
+        "wander absolute"
+        if (config.frame, config.azimuth) == ("wander", "absolute")
+        else config.frame,
         config.levelling_rate,
     )
     if config.aided:
@@ -189,12 +190,13 @@ def run(log: Log, config: Config = DEFAULTS) -> Run:
     )
     gps = with_axes(gps, samples, gnss)
     outcome = _solve(drive, start, corrections, noise, sigmas)
-    trajectory = _trajectory(outcome, samples, stops)
+    trajectory = with_coordinates(_trajectory(outcome, samples, stops), config)
     variants = _variants(drive, start, noise, sigmas, samples, config, outcome)
     judged = {} if log.gnss is None else _judge_all(trajectory, variants, log.gnss, gps)
     errors, before = judged.pop("", None), judged.pop("before", None)
     findings = [*log.findings, *samples.findings, *start_findings]
     findings += stop_findings(stops, outcome.records, samples.t_ns)
+    findings += polar_findings(trajectory, config)
     findings += [] if errors is None else list(errors.findings)
     return Run(
         log, config, samples.orientation, trajectory, stops, outcome.records, alignment, gps,
@@ -206,9 +208,10 @@ def _run_filter(drive: Drive, log: Log, config: Config, samples: Samples) -> Run
     """The same with ``--method filter`` or ``smooth``."""
     aided = run_aided(drive, samples.t_ns, log, config, given_start(config))
     aided = replace(aided, gps=with_axes(aided.gps, samples, log.gnss))
-    trajectory = _trajectory(aided.outcome, samples, aided.stops)
+    trajectory = with_coordinates(_trajectory(aided.outcome, samples, aided.stops), config)
     errors = judge_aided(trajectory, log, aided, config)
     findings = [*log.findings, *samples.findings, *aided.findings]
+    findings += polar_findings(trajectory, config)
     findings += [] if errors is None else list(errors.findings)
     return Run(
         log, config, samples.orientation, trajectory, aided.stops, aided.outcome.records,
@@ -241,10 +244,8 @@ def run_at_found_offset(log: Log, config: Config = DEFAULTS) -> Run:
 
 def search_stops(log: Log, config: Config = DEFAULTS) -> StopSearch:
     """The stops of a log, with the samples they were found in. LogError as :func:`run`."""
-    samples, rule = _samples(log, config), stop_rule(config)
-    statistics = stop_statistics(samples.t, samples.omega, samples.f, rule)
-    stops = stops_from_statistics(samples.t, samples.f, statistics, rule)
-    return StopSearch(samples, rule, statistics, stops)
+    samples = _samples(log, config)
+    return StopSearch(samples, stop_rule(config), samples.statistics, samples.stops)
 
 
 def no_stop_advice(path: str, search: StopSearch) -> str:

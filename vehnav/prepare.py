@@ -14,7 +14,7 @@ from vehnav.clues import GpsBetween
 from vehnav.errors import Finding, LogError
 from vehnav.logs.log import MIN_IMU_RATE_HZ, Imu, Log
 from vehnav.orientation import Declared, Orientation, in_si, orient
-from vehnav.stops import StopRule
+from vehnav.stops import Stop, StopRule, StopStatistics, stop_statistics, stops_from_statistics
 from vehnav.strapdown.increments import (
     Increments,
     gap_steps,
@@ -46,6 +46,8 @@ class Samples:
         Over the n-1 steps.
     orientation : Orientation
         Axes, mounting and units, with the evidence.
+    statistics : StopStatistics
+    stops : list of Stop
     findings : tuple of Finding
     """
 
@@ -55,6 +57,8 @@ class Samples:
     f: Array
     increments: Increments
     orientation: Orientation
+    statistics: StopStatistics
+    stops: list[Stop]
     findings: tuple[Finding, ...]
 
 
@@ -108,6 +112,9 @@ def prepare_samples(
 ) -> Samples:
     """Turn the samples into the body in SI, integrate them over their steps, name the gaps.
 
+    The stops are found once, on the sensor axes: the statistics are sizes of vectors, which no
+    turn of the axes changes, and the evidence for the axes needs them.
+
     Parameters
     ----------
     imu : Imu
@@ -120,7 +127,7 @@ def prepare_samples(
     max_gap : float
         s
     rule : StopRule
-        Of the stops that the evidence rests on.
+        Of the stops.
     gps : callable or None
         Velocity by GPS between two instants, for the evidence; None: not to be used.
     gps_seconds : float
@@ -138,9 +145,11 @@ def prepare_samples(
     dt = np.diff(t, prepend=t[0] - imu.median_dt)[:, None]
     as_rates = imu.sampling == "rates"
     gyro, accel = (imu.gyro, imu.accel) if as_rates else (imu.gyro / dt, imu.accel / dt)
+    statistics = stop_statistics(t, gyro, accel, rule)
+    stops = stops_from_statistics(t, accel, statistics, rule)
     orientation = orient(
-        imu, t, gyro, accel, declared,
-        path=path, units=units, rule=rule, gps=gps, gps_seconds=gps_seconds,
+        imu, t, gyro, accel, stops, declared,
+        path=path, units=units, gps=gps, gps_seconds=gps_seconds,
     )  # fmt: skip
     c_gyro, c_accel = orientation.matrices()
     omega, f = gyro @ c_gyro.T, accel @ c_accel.T
@@ -151,7 +160,7 @@ def prepare_samples(
             t, imu.gyro @ c_gyro.T, imu.accel @ c_accel.T, max_gap=max_gap
         )
     everything = (*findings, *orientation.findings, *gaps)
-    return Samples(imu.t_ns, t, omega, f, increments, orientation, everything)
+    return Samples(imu.t_ns, t, omega, f, increments, orientation, statistics, stops, everything)
 
 
 def hopeless_gaps(t_ns: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:

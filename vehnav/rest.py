@@ -10,6 +10,10 @@ import numpy as np
 import numpy.typing as npt
 
 Array = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
+
+BLOCK = 8192
+"""Windows that are worked on at a time: they stay in the cache of the processor."""
 
 
 class TimeIntegral:
@@ -25,24 +29,40 @@ class TimeIntegral:
 
     def __init__(self, t: Array, y: Array) -> None:
         self.t = t
-        self.y = y - y[0]  # offset removed: sums stay small, digits stay
         self._offset = y[0]
-        steps = 0.5 * (self.y[1:] + self.y[:-1]) * np.diff(t)[:, None]
-        self._sum = np.concatenate([np.zeros((1, y.shape[1])), np.cumsum(steps, axis=0)])
+        self._y = np.empty((y.shape[1], t.size))
+        self._sum = np.zeros_like(self._y)
+        dt = np.diff(t)
+        for k, (column, sums) in enumerate(zip(self._y, self._sum, strict=True)):
+            np.subtract(y[:, k], y[0, k], out=column)  # from 0: sums stay small, digits stay
+            np.cumsum(0.5 * (column[1:] + column[:-1]) * dt, out=sums[1:])
 
     def mean(self, start: Array, end: Array) -> Array:
         """(k, m) means over the windows [start, end] (k,), cut to the span of the signal."""
         start = np.clip(start, self.t[0], self.t[-1])
         end = np.clip(end, self.t[0], self.t[-1])
-        length = np.maximum(end - start, 1e-12)[:, None]
-        return np.asarray((self._at(end) - self._at(start)) / length + self._offset)
+        means = np.empty((start.size, self._offset.size))
+        for at in range(0, start.size, BLOCK):
+            block = slice(at, at + BLOCK)
+            length = np.maximum(end[block] - start[block], 1e-12)
+            first, last = self._place(start[block]), self._place(end[block])
+            for k, offset in enumerate(self._offset):
+                gained = self._at(k, *last) - self._at(k, *first)
+                means[block, k] = gained / length + offset
+        return means
 
-    def _at(self, x: Array) -> Array:
-        k = np.clip(np.searchsorted(self.t, x, side="right") - 1, 0, self.t.size - 2)
-        s = (x - self.t[k])[:, None]
-        h = (self.t[k + 1] - self.t[k])[:, None]
-        slope = (self.y[k + 1] - self.y[k]) / h
-        return np.asarray(self._sum[k] + s * (self.y[k] + 0.5 * s * slope))
+    def _place(self, x: Array) -> tuple[IntArray, Array, Array]:
+        """(step that x (k,) lies in, s since the start of that step, its length)."""
+        step = np.clip(np.searchsorted(self.t, x, side="right") - 1, 0, self.t.size - 2)
+        start = self.t[step]
+        return step, x - start, self.t[step + 1] - start
+
+    def _at(self, column: int, step: IntArray, s: Array, h: Array) -> Array:
+        """(k,) antiderivative of one column."""
+        y = self._y[column]
+        y0 = y[step]
+        slope = (y[step + 1] - y0) / h
+        return np.asarray(self._sum[column][step] + s * (y0 + 0.5 * s * slope))
 
 
 def running_mean(t: Array, y: Array, window: float) -> Array:
@@ -58,14 +78,14 @@ def running_deviation(t: Array, y: Array, window: float) -> Array:
     """
     half = 0.5 * window
     centred = y - y.mean(axis=0)
-    both = TimeIntegral(t, np.concatenate([centred, centred * centred], axis=1))
+    both = TimeIntegral(t, np.concatenate([centred.T, (centred * centred).T]).T)
     means = both.mean(t - half, t + half)
     m = y.shape[1]
     variance = np.sum(means[:, m:] - means[:, :m] ** 2, axis=1)
     return np.asarray(np.sqrt(np.maximum(variance, 0.0)))
 
 
-def samples_in_window(t: Array, window: float) -> npt.NDArray[np.int64]:
+def samples_in_window(t: Array, window: float) -> IntArray:
     """(n,) number of samples inside the centred ``window`` (s)."""
     half = 0.5 * window
     after = np.searchsorted(t, t + half, side="right")
@@ -73,7 +93,7 @@ def samples_in_window(t: Array, window: float) -> npt.NDArray[np.int64]:
     return np.asarray(after - before)
 
 
-def runs(mask: npt.NDArray[np.bool_]) -> npt.NDArray[np.int64]:
+def runs(mask: npt.NDArray[np.bool_]) -> IntArray:
     """(k, 2): first and last index of each run of True, both included.
 
     >>> runs(np.array([False, True, True, False, True])).tolist()

@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from vehnav.clues import GpsBetween, Rest, by_gps, turns
 from vehnav.rest import TimeIntegral, running_deviation, running_mean
-from vehnav.stops import FORCE_THRESHOLD
+from vehnav.stops import FORCE_THRESHOLD, SLOW_MEAN
 from vehnav.units import ACCEL_UNITS, DEG, GYRO_UNITS, STANDARD_GRAVITY
 
 Array = npt.NDArray[np.float64]
@@ -117,8 +117,9 @@ def establish_units(t: Array, gyro: Array, accel: Array, *, gps: GpsBetween | No
     """
     rest = quietest(t, gyro, accel)
     force = float(np.linalg.norm(rest.force))
-    mean = np.linalg.norm(running_mean(t, accel, 0.25), axis=1)
-    steady = float(np.mean(np.abs(mean / max(force, 1e-12) - 1.0) < STEADY)) >= STEADY_SHARE
+    mean = running_mean(t, accel, SLOW_MEAN)
+    size = np.linalg.norm(mean, axis=1)
+    steady = float(np.mean(np.abs(size / max(force, 1e-12) - 1.0) < STEADY)) >= STEADY_SHARE
     dt = float(np.median(np.diff(t)))
     accel_unit = next(
         (
@@ -136,7 +137,8 @@ def establish_units(t: Array, gyro: Array, accel: Array, *, gps: GpsBetween | No
     gravity = accel_unit != "m/s2" or force >= (NO_GRAVITY if steady else HALF_GRAVITY)
     scale = ACCEL_UNITS[accel_unit]
     rest = replace(rest, force=rest.force * scale)
-    unit, rate, doubt, until = _gyro_unit(t, gyro, accel * scale, rest, gps)
+    moving = running_deviation(t, mean * scale, 2.0) > FORCE_THRESHOLD
+    unit, rate, doubt, until = _gyro_unit(t, gyro, accel * scale, rest, moving, gps)
     if accel_unit == "m/s2" and abs(force / STANDARD_GRAVITY - 1.0) > TOLERANCE:
         doubt = f"the accelerometer reads {force:.3g} at rest, which is no unit of gravity"
     return Units(unit, accel_unit, False, force, rate, gravity, doubt, until)
@@ -161,13 +163,18 @@ def quietest(t: Array, gyro: Array, accel: Array) -> Rest:
 
 
 def _gyro_unit(
-    t: Array, gyro: Array, f: Array, rest: Rest, gps: GpsBetween | None
+    t: Array,
+    gyro: Array,
+    f: Array,
+    rest: Rest,
+    moving: npt.NDArray[np.bool_],
+    gps: GpsBetween | None,
 ) -> tuple[str, float | None, str, float | None]:
     """(unit, median rate in motion, doubt, last instant of GPS that decided)."""
-    moving = running_deviation(t, running_mean(t, f, 0.25), 2.0) > FORCE_THRESHOLD
     if np.mean(moving) * (t[-1] - t[0]) < 5.0:
         return "rad/s", None, "", None
-    rate = float(np.median(np.linalg.norm(running_mean(t, gyro, 0.25)[moving] - rest.rate, axis=1)))
+    slow = running_mean(t, gyro, SLOW_MEAN)
+    rate = float(np.median(np.linalg.norm(slow[moving] - rest.rate, axis=1)))
     if rate < SURELY_RADIANS:
         return "rad/s", rate, "", None
     if rate > SURELY_DEGREES:
