@@ -1,0 +1,62 @@
+"""The words of the outputs, and the order of what is worst."""
+
+from __future__ import annotations
+
+import pytest
+from batch_for_tests import MAX, broken, ok, suite
+
+from vehnav.batch.baseline import baseline_of
+from vehnav.batch.regression import Paired, compare_with
+from vehnav.batch.wording import interval_text, moved, regressions, remarks, short, worst_first
+
+
+@pytest.mark.parametrize(
+    ("interval", "text"),
+    [
+        (None, "too few logs for an interval"),
+        ((0.051, 0.07), "95 %: 5.1 to 7.0 % worse"),
+        ((-0.07, -0.051), "95 %: 7.0 to 5.1 % better"),
+        ((-0.02, 0.14), "95 %: 2.0 % better to 14.0 % worse"),
+        ((0.0, 0.14), "95 %: the same to 14.0 % worse"),
+        ((0.2, 0.2000001), "95 %: 20.0 % worse"),
+        ((5.0, 20.0), "95 %: 500 % worse to 21 times"),
+    ],
+)
+def test_intervals(interval, text: str) -> None:
+    row = Paired("c", "g", MAX, "less", 9, 5, 4, 1.0, 1.0, 0.0, interval, True, False, "same")
+    assert interval_text(row) == text
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [(0.0004, "0"), (999.6, "1000"), (99.96, "100"), (1.5e7, "15000000"), (-0.0004, "0")],
+)
+def test_figures(value: float, text: str) -> None:
+    assert short(value) == text
+
+
+def test_a_change_too_small_to_print_is_not_called_none() -> None:
+    assert moved(1e-5) == "under 0.1 % worse"
+
+
+def test_what_did_not_run_comes_first_then_missed_bars_then_the_largest() -> None:
+    rows = [ok("small", 1.0), ok("far", 80.0), ok("large", 30.0), broken("dead"), ok("none", None)]
+    order = [r.log for r in worst_first(rows)]
+    assert order == ["dead", "none", "far", "large", "small"]
+
+
+def test_sentences_of_a_comparison() -> None:
+    before = suite([ok("a", 10.0), ok("b", 10.0), broken("c"), ok("d", 1.0)])
+    now = suite([ok("a", 20.0), broken("b"), ok("c", 5.0), ok("e", 1.0)])
+    item = compare_with(baseline_of(before), now, max_regression=0.05)
+    assert regressions(item) == [
+        f"city, default: {MAX} 100 % worse in the median of 1 log (too few logs for an interval; "
+        "1 worse, 0 better): regressed",
+        "b/default: crashed; in the baseline it ran",
+        f"a/default: {MAX} 10 m -> 20 m (100 % worse)",
+    ]
+    assert remarks(item) == [
+        "c/default: ran; in the baseline it crashed",
+        "1 only in the baseline: d/default",
+        "1 not in the baseline: e/default",
+    ]
