@@ -25,12 +25,10 @@ from vehnav.logs.log import Gnss, Log
 from vehnav.start import Alignment, Given, GpsUse
 from vehnav.stops import Stop
 from vehnav.trajectory import Trajectory
-from vehnav.units import DEG, NS
+from vehnav.units import NS
 
 Array = npt.NDArray[np.float64]
 
-NEAR_POLE: Final = 89.9 * DEG
-"""rad of latitude beyond which East-North-Up columns of the output turn too fast to be of use."""
 VETO_SPEED: Final = 1.0
 """m/s of GPS, in the median over a stop, that make it none (spec C 1)."""
 FEW_FIXES: Final = 3
@@ -245,7 +243,4 @@ def _findings(
     if given.heading is None and given.attitude is None and not start.fitted:
         text = "no course of GPS shows the heading at the start: the frame is only local"
         findings.append(Finding("local-frame", "warning", text))
-    if np.max(np.abs(result.outcome.position[:, 0])) > NEAR_POLE:
-        text = "beyond 89.9 degrees: east and north of the output turn fast (--coords quasi)"
-        findings.append(Finding("near-pole", "warning", text))
     return findings

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any, Final, Literal
 
 import numpy as np
@@ -22,6 +23,7 @@ from vehnav.stops import MARGIN_WARNING, Stop, stop_numbers
 from vehnav.strapdown.eci import mechanize_eci
 from vehnav.strapdown.enu import Solution, StopControl, mechanize_enu
 from vehnav.strapdown.increments import Increments
+from vehnav.strapdown.wander import Azimuth, c_we_from_geodetic, mechanize_wander
 
 Array = npt.NDArray[np.float64]
 
@@ -33,9 +35,29 @@ FAST_STOP = 3.0
 MEAN_OFFSET = 0.5
 """s in the gain 1/(t + 0.5 s): the running mean since levelling began (spec A 4.3, spec C 3)."""
 
+
+def _in_wander_axes(
+    increments: Increments,
+    *,
+    position: tuple[float, float, float],
+    v_n: tuple[float, float, float] = (0.0, 0.0, 0.0),
+    c_nb: Array,
+    azimuth: Azimuth,
+    **options: Any,
+) -> Solution:
+    """As :func:`mechanize_enu`, in axes free in azimuth that start as East-North-Up."""
+    c_we, height = c_we_from_geodetic(*position[:2]), position[2]
+    solution = mechanize_wander(
+        increments, c_we=c_we, height=height, v_w=v_n, c_wb=c_nb, azimuth=azimuth, **options
+    )
+    return solution.enu()
+
+
 MECHANIZATIONS: Final[dict[str, Callable[..., Solution]]] = {
     "enu": mechanize_enu,
     "eci": mechanize_eci,
+    "wander": partial(_in_wander_axes, azimuth="relative"),
+    "wander absolute": partial(_in_wander_axes, azimuth="absolute"),
 }
 """Frame -> function with the arguments of :func:`vehnav.strapdown.enu.mechanize_enu`."""
 

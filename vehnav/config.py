@@ -50,6 +50,8 @@ class Config:
         Whether only what was known at the time may be used.
     frame : {"enu", "eci", "wander"}
         Of the mechanization.
+    coords : {"auto", "normal", "quasi"}
+        Whether quasi-coordinates are written too; ``auto``: in wander axes beyond 85 degrees.
     vertical : {"clamp", "free"}
     ellipsoid : {"wgs84", "krasovsky"}
     levelling_rate : float or None
@@ -91,6 +93,7 @@ class Config:
     reset: bool = True
     causal: bool = False
     frame: Literal["enu", "eci", "wander"] = "enu"
+    coords: Literal["auto", "normal", "quasi"] = "auto"
     vertical: Literal["clamp", "free"] = "clamp"
     ellipsoid: Literal["wgs84", "krasovsky"] = "wgs84"
     levelling_rate: float | None = None
@@ -122,8 +125,6 @@ class Config:
             raise ConfigError(f"--aid {','.join(unknown)}: the aids are {', '.join(AIDS)}")
         if not self.aided and (self.aid is not None or self.gps == "aid"):
             raise ConfigError("--aid and --gps aid belong to --method filter or smooth")
-        if not self.aided and self.frame == "wander":
-            raise ConfigError("--frame wander belongs to --method filter or smooth")
         if self.method == "smooth" and self.causal:
             raise ConfigError("--method smooth looks ahead; with --causal use --method filter")
         for text in self.outage:
@@ -135,6 +136,11 @@ class Config:
     def aided(self) -> bool:
         """Whether the method is a filter."""
         return self.method in ("filter", "smooth")
+
+    @property
+    def free_azimuth(self) -> bool:
+        """Whether the solution is carried in wander axes, as the filter's always is."""
+        return self.aided or self.frame == "wander"
 
     @property
     def tactical(self) -> bool | None:

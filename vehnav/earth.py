@@ -66,6 +66,9 @@ KRASOVSKY: Final = Ellipsoid(
 )
 """As paper 004 prints it: rounded e2 and gravity; the paper takes gravity at h = 0."""
 ELLIPSOIDS: Final = {"wgs84": WGS84, "krasovsky": KRASOVSKY}
+POLAR: Final = math.radians(85.0)
+"""rad of latitude beyond which East-North-Up of two near places is not taken as one: the axes turn
+by a tenth of a degree over a kilometre, by 45 degrees over a metre at a metre from the pole."""
 
 
 # ---- kernels -----------------------------------------------------------------------------------
@@ -151,6 +154,13 @@ def c_en(lat: npt.ArrayLike, lon: npt.ArrayLike) -> Array:
     return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
 
 
+def turn_of_axes(
+    lat: npt.ArrayLike, lon: npt.ArrayLike, to_lat: npt.ArrayLike, to_lon: npt.ArrayLike
+) -> Array:
+    """(..., 3, 3): turns East-North-Up components of one place into those of another (rad)."""
+    return np.asarray(np.swapaxes(c_en(to_lat, to_lon), -1, -2) @ c_en(lat, lon))
+
+
 def local_enu(
     lat: npt.ArrayLike,
     lon: npt.ArrayLike,
@@ -191,10 +201,18 @@ def position_difference(
     """(east, north) (..., 2), m, of a position minus a reference: R dlat and R cos(lat) dlon.
 
     Radii at the mean latitude; the difference of longitudes is wrapped to +-180 degrees. Within
-    1e-6 of the geodesic for differences up to some kilometres away from the poles.
+    1e-6 of the geodesic for differences up to some kilometres. Beyond :data:`POLAR` it is the
+    difference of the Earth-fixed vectors in the axes of the reference, right at the pole too.
     """
     lat, lon, lat_ref, lon_ref, h = (np.asarray(x, float) for x in (lat, lon, lat_ref, lon_ref, h))
     mean = 0.5 * (lat + lat_ref)
     r_lat, r_lon = radii(mean, h, earth=earth)
     d_lon = np.remainder(lon - lon_ref + math.pi, 2.0 * math.pi) - math.pi
-    return np.stack([r_lon * np.cos(mean) * d_lon, r_lat * (lat - lat_ref)], axis=-1)
+    out = np.stack(np.broadcast_arrays(r_lon * np.cos(mean) * d_lon, r_lat * (lat - lat_ref)), -1)
+    polar = np.abs(lat_ref) > POLAR
+    if np.any(polar):
+        d_e = ecef_from_geodetic(lat, lon, h, earth=earth)
+        d_e = d_e - ecef_from_geodetic(lat_ref, lon_ref, h, earth=earth)
+        exact = np.einsum("...ji,...j->...i", c_en(lat_ref, lon_ref), d_e)[..., :2]
+        out = np.where(polar[..., None], exact, out)
+    return out

@@ -157,6 +157,10 @@ def test_wander_law_on_a_parallel(azimuth, expected):  # T6, (4) and (5)
         azimuth=azimuth,
     )
     assert float(geodetic_from_c_we(found.c_we[-1])[2]) == pytest.approx(expected, abs=1e-8)
+    r_n = WGS84.a / np.sqrt(1 - WGS84.e2 * np.sin(lat) ** 2)
+    lon = np.remainder(3.0 + 30.0 / (r_n * np.cos(lat)) * t + np.pi, 2 * np.pi) - np.pi
+    along = quasi.wander_along(t, np.full(t.size, lat), lon, azimuth=azimuth)
+    assert along[-1] == pytest.approx(expected, abs=1e-8)
     assert np.ptp(found.enu().position[:, 0]) * WGS84.a < 1e-3  # stays on its parallel
 
 
@@ -232,6 +236,12 @@ def test_pole_crossing(near_miss):  # T10, T11
     absolute = over_the_pole(truth, increments, "absolute")
     assert np.max(apart(relative, truth)) < 1e-5
     assert np.max(apart(absolute, truth)) < 1e-5
+    t = (truth.t_ns - truth.t_ns[0]) * NS
+    for found, azimuth in ((relative, "relative"), (absolute, "absolute")):
+        lat, lon, wander = geodetic_from_c_we(found.c_we)
+        along = quasi.wander_along(t, lat, lon, azimuth=azimuth)
+        off = np.remainder(along - wander + np.pi, 2 * np.pi) - np.pi
+        assert np.max(np.abs(off)) < 1e-8
     enu = mechanize_enu(
         increments,
         position=(truth.lat[0], truth.lon[0], truth.height[0]),

@@ -54,8 +54,8 @@ RESULTS = ("trajectory.csv", "report.json", "report.html")
 """What every run writes into its folder."""
 RUN_FIELDS = (
     "axes", "accel_axes", "mount", "stamps", "max_gap", "split", "method", "as_published",
-    "levelling",
-    "reset", "causal", "frame", "vertical", "ellipsoid", "levelling_rate", "stop_threshold",
+    "levelling", "reset", "causal", "frame", "coords", "vertical", "ellipsoid", "levelling_rate",
+    "stop_threshold",
     "stop_statistic", "stop_window", "stop_dwell", "gps", "gps_start_seconds", "start_position",
     "start_heading", "start_attitude", "aid", "sensor", "sensor_grade", "azimuth", "outage",
 )  # fmt: skip
@@ -133,6 +133,12 @@ RUN_FIELDS = (
     show_default=True,
     help="Frame of the mechanization: local East-North-Up (paper 004), inertial (paper 000) or "
     "wander (paper 003; what the filter uses anyway).",
+)  # fmt: skip
+@option(
+    "method", "--coords", type=click.Choice(["auto", "normal", "quasi"]), default="auto",
+    show_default=True,
+    help="quasi: also write quasi-latitude, quasi-longitude and headings that stay regular at a "
+    "pole (paper 003); auto: with wander axes beyond 85 degrees of latitude.",
 )  # fmt: skip
 @option(
     "method", "--vertical", type=click.Choice(["clamp", "free"]), default="clamp",

@@ -10,7 +10,7 @@ from typing import Any, Final, Literal
 import numpy as np
 import numpy.typing as npt
 
-from vehnav.earth import local_enu, position_difference
+from vehnav.earth import POLAR, local_enu, position_difference, turn_of_axes
 from vehnav.errors import Finding
 from vehnav.evaluation.align import Align, Fit, aligned
 from vehnav.evaluation.ape import Relation, ape, evo_statistics, rpe
@@ -183,7 +183,8 @@ def _same_place(trajectory: Trajectory, gnss: Gnss) -> None:
 
 
 def _subtract(states: Trajectory, judged: Gnss, way: Array) -> Errors:
-    """Position and velocity errors, and the honesty of the sigmas."""
+    """Position and velocity errors, in the axes of the reference near the poles."""
+    states = _in_axes_of(states, judged)
     east, north = position_difference(
         states.lat, states.lon, judged.lat, judged.lon, judged.height
     ).T
@@ -203,6 +204,17 @@ def _subtract(states: Trajectory, judged: Gnss, way: Array) -> Errors:
         velocity=None if judged.v_n is None else states.v_n - judged.v_n,
         reference_sigma=judged.sigma_pos,
     )
+
+
+def _in_axes_of(states: Trajectory, judged: Gnss) -> Trajectory:
+    """The states with velocity and attitude in the axes of the fixes, where these turn fast."""
+    polar = np.abs(judged.lat) > POLAR
+    if not np.any(polar):
+        return states
+    turn = turn_of_axes(states.lat, states.lon, judged.lat, judged.lon)
+    turn[~polar] = np.eye(3)
+    v_n = np.einsum("kij,kj->ki", turn, states.v_n)
+    return replace(states, v_n=v_n, c_nb=turn @ states.c_nb)
 
 
 def _with_attitude(errors: Errors, c_ref: Array | None) -> Errors:

@@ -11,8 +11,9 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from vehnav.earth import position_difference
+from vehnav.earth import POLAR, position_difference
 from vehnav.logs.log import Gnss
+from vehnav.strapdown.quasi import wander_along
 from vehnav.units import NS
 
 Array = npt.NDArray[np.float64]
@@ -39,11 +40,30 @@ VELOCITY_SLACK: Final = 5.0
 
 
 def tracks(gnss: Gnss) -> Array:
-    """(m, 2) m: east and north of the fixes from the first one, summed along the track."""
+    """(m, 2) m: east and north of the fixes from the first one, summed along the track.
+
+    Of a track that comes near a pole, the axes are those that are free in azimuth: the plane rolls
+    along without turning (:func:`turning`).
+    """
     step = position_difference(
         gnss.lat[1:], gnss.lon[1:], gnss.lat[:-1], gnss.lon[:-1], gnss.height[1:]
     )
+    if np.any(np.abs(gnss.lat) > POLAR):
+        step = turned(step, -turning(gnss)[:-1])
     return np.concatenate([np.zeros((1, 2)), np.cumsum(step, axis=0)])
+
+
+def turning(gnss: Gnss) -> Array:
+    """(m,) rad: wander angle of the axes of :func:`tracks`, zero away from the poles."""
+    if not np.any(np.abs(gnss.lat) > POLAR):
+        return np.zeros(gnss.t_ns.size)
+    return wander_along(seconds(gnss), gnss.lat, gnss.lon)
+
+
+def turned(plane: Array, angle: Array) -> Array:
+    """(m, 2) vectors turned counter-clockwise by ``angle`` (m,), rad."""
+    s, c = np.sin(angle), np.cos(angle)
+    return np.column_stack([c * plane[:, 0] - s * plane[:, 1], s * plane[:, 0] + c * plane[:, 1]])
 
 
 def _window_means(t: Array, x: Array, before: float, after: float) -> tuple[Array, Array]:
@@ -80,8 +100,9 @@ def _still_by_position(t: Array, position: Array) -> BoolArray:
     return np.asarray(np.hypot(motion[:, 0], motion[:, 1]) < STANDING_BY_POSITION)
 
 
-def _still_by_velocity(t: Array, v_n: Array) -> BoolArray:
-    _, mean = _window_means(t, v_n[:, :2], VELOCITY_WINDOW, VELOCITY_WINDOW)
+def _still_by_velocity(gnss: Gnss, v_n: Array) -> BoolArray:
+    v = turned(v_n[:, :2], -turning(gnss))
+    _, mean = _window_means(seconds(gnss), v, VELOCITY_WINDOW, VELOCITY_WINDOW)
     return np.asarray(np.hypot(mean[:, 0], mean[:, 1]) < STANDING_BY_VELOCITY)
 
 
@@ -94,7 +115,7 @@ def trusted_velocity(gnss: Gnss) -> Array | None:
         return gnss.v_n
     t, position = seconds(gnss), tracks(gnss)
     by_position = _path_by_position(t, position, _still_by_position(t, position))[-1]
-    by_velocity = _path_by_velocity(t, gnss.v_n, _still_by_velocity(t, gnss.v_n))[-1]
+    by_velocity = _path_by_velocity(t, gnss.v_n, _still_by_velocity(gnss, gnss.v_n))[-1]
     apart = abs(by_velocity - by_position)
     return gnss.v_n if apart <= VELOCITY_TRUST * by_position + VELOCITY_SLACK else None
 
@@ -104,7 +125,7 @@ def standing(gnss: Gnss) -> BoolArray:
     v_n = trusted_velocity(gnss)
     if v_n is None:
         return _still_by_position(seconds(gnss), tracks(gnss))
-    return _still_by_velocity(seconds(gnss), v_n)
+    return _still_by_velocity(gnss, v_n)
 
 
 def _path_by_velocity(t: Array, v_n: Array, still: BoolArray) -> Array:
@@ -144,7 +165,7 @@ def path_distance(gnss: Gnss) -> Array:
         return np.zeros(gnss.t_ns.size)
     t, v_n = seconds(gnss), trusted_velocity(gnss)
     if v_n is not None:
-        return _path_by_velocity(t, v_n, _still_by_velocity(t, v_n))
+        return _path_by_velocity(t, v_n, _still_by_velocity(gnss, v_n))
     position = tracks(gnss)
     return _path_by_position(t, position, _still_by_position(t, position))
 
@@ -156,7 +177,7 @@ def course(gnss: Gnss) -> Array:
     """
     velocity = trusted_velocity(gnss)
     if velocity is None:
-        velocity = mean_motion(seconds(gnss), tracks(gnss), COURSE_WINDOW)
+        velocity = turned(mean_motion(seconds(gnss), tracks(gnss), COURSE_WINDOW), turning(gnss))
     moving = np.hypot(velocity[:, 0], velocity[:, 1]) >= COURSE_SPEED
     moving &= ~standing(gnss)
     if not moving.any():

@@ -8,10 +8,12 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from vehnav.earth import position_difference
+from vehnav.earth import POLAR, position_difference
 from vehnav.errors import FormatError
 from vehnav.export.decimals import Column, column
 from vehnav.rotation import angles_from_c_nb, c_nb_from_angles
+from vehnav.strapdown.place import c_nw, c_we_from_geodetic
+from vehnav.strapdown.quasi import gyro_heading, quasi_from_geodetic, quasi_heading, wander_along
 from vehnav.trajectory import Trajectory
 from vehnav.units import NS
 
@@ -34,8 +36,15 @@ DECIMALS: Final = {
     "sigma_north_m": 4,
     "sigma_up_m": 4,
     "sigma_heading_deg": 5,
+    "eps_deg": 5,
+    "qlat_deg": 10,
+    "qlon_deg": 10,
+    "qheading_deg": 5,
+    "gyro_heading_deg": 5,
 }
 """Columns of ``trajectory.csv`` after the time, and their decimals."""
+QUASI: Final = ("eps_deg", "qlat_deg", "qlon_deg", "qheading_deg", "gyro_heading_deg")
+"""Columns that ``--coords`` adds; all but the first follow from the others."""
 REQUIRED: Final = ("lat_deg", "lon_deg")
 
 
@@ -59,7 +68,20 @@ def to_columns(trajectory: Trajectory) -> dict[str, Array]:
             columns[name] = trajectory.sigma_pos[:, k]
     if trajectory.sigma_heading is not None:
         columns["sigma_heading_deg"] = np.degrees(trajectory.sigma_heading)
+    if trajectory.wander is not None:
+        columns |= quasi_columns(trajectory, trajectory.wander)
     return columns
+
+
+def quasi_columns(trajectory: Trajectory, wander: Array) -> dict[str, Array]:
+    """Wander angle, quasi-coordinates and the headings that stay regular at a pole (paper 003)."""
+    lat, lon = trajectory.lat, trajectory.lon
+    c_we = c_we_from_geodetic(lat, lon, wander)
+    c_wb = np.swapaxes(c_nw(wander), 1, 2) @ trajectory.c_nb
+    lat_q, lon_q, _ = quasi_from_geodetic(lat, lon, trajectory.height)
+    eps = np.remainder(wander + np.pi, 2.0 * np.pi) - np.pi
+    angles = (eps, lat_q, lon_q, quasi_heading(c_we, c_wb), gyro_heading(c_wb))
+    return {name: np.degrees(x) for name, x in zip(QUASI, angles, strict=True)}
 
 
 def fixed_columns(trajectory: Trajectory) -> list[Column]:
@@ -93,6 +115,7 @@ def from_columns(t_ns: TimeArray, columns: Mapping[str, Array], *, where: str) -
     sigmas = [columns.get(name) for name in ("sigma_east_m", "sigma_north_m", "sigma_up_m")]
     given = [s for s in sigmas if s is not None]
     sigma_heading = columns.get("sigma_heading_deg")
+    wander = columns.get("eps_deg")
     return Trajectory(
         t_ns=t_ns,
         lat=lat,
@@ -103,6 +126,7 @@ def from_columns(t_ns: TimeArray, columns: Mapping[str, Array], *, where: str) -
         stopped=columns.get("stopped", zero) > 0.5,
         sigma_pos=np.column_stack(given) if len(given) == 3 else None,
         sigma_heading=None if sigma_heading is None else np.radians(sigma_heading),
+        wander=None if wander is None else np.radians(wander),
     )
 
 
@@ -135,9 +159,14 @@ def check(t_ns: TimeArray, columns: Mapping[str, Array], *, where: str) -> None:
 def velocity_of(t_ns: TimeArray, lat: Array, lon: Array, height: Array) -> Array:
     """(n, 3) m/s: East-North-Up velocities as differences of positions."""
     step = position_difference(lat[1:], lon[1:], lat[:-1], lon[:-1], height[1:])
-    plane = np.concatenate([np.zeros((1, 2)), np.cumsum(step, axis=0)])
     t = (t_ns - t_ns[0]) * NS
-    return np.asarray(np.gradient(np.column_stack([plane, height]), t, axis=0))
+    wander = np.zeros(lat.size)  # of axes that do not turn; needed near the poles alone
+    if np.any(np.abs(lat) > POLAR):
+        wander = wander_along(t, lat, lon)
+        step = np.einsum("kji,kj->ki", c_nw(wander[:-1])[:, :2, :2], step)
+    plane = np.concatenate([np.zeros((1, 2)), np.cumsum(step, axis=0)])
+    slope = np.gradient(np.column_stack([plane, height]), t, axis=0)
+    return np.asarray(np.einsum("kij,kj->ki", c_nw(wander), slope) if np.any(wander) else slope)
 
 
 def course_of(v_n: Array) -> Array:

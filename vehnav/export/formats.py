@@ -84,7 +84,7 @@ def format_of(path: str | Path) -> Format:
 
 
 def _refuse_nan(trajectory: Trajectory) -> None:
-    for name in ("lat", "lon", "height", "v_n", "c_nb", "sigma_pos", "sigma_heading"):
+    for name in ("lat", "lon", "height", "v_n", "c_nb", "sigma_pos", "sigma_heading", "wander"):
         values = getattr(trajectory, name)
         if values is not None and not np.all(np.isfinite(values)):
             raise ValueError(f"trajectory: {name} is not finite: refused, nothing is written")

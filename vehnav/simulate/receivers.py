@@ -7,7 +7,15 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from vehnav.earth import WGS84, Ellipsoid
+from vehnav.earth import (
+    POLAR,
+    WGS84,
+    Ellipsoid,
+    c_en,
+    ecef_from_geodetic,
+    geodetic_from_ecef,
+    turn_of_axes,
+)
 from vehnav.logs.log import Gnss, Speed
 from vehnav.sensors import processes
 from vehnav.trajectory import Trajectory, interpolate_positions
@@ -15,6 +23,7 @@ from vehnav.units import NS
 
 Array = npt.NDArray[np.float64]
 TimeArray = npt.NDArray[np.int64]
+Place = tuple[Array, Array, Array]
 
 
 @dataclass(frozen=True)
@@ -104,29 +113,60 @@ def simulate_gnss(
     slow = rng.standard_normal((t.size, 3))
     error = axes * (error + model.drift * _markov(t, slow, time=model.drift_time))
     velocity_error = axes * rng.standard_normal((t.size, 3))
-    lat, lon, height = interpolate_positions(truth, valid_ns)
-    w2 = 1.0 - earth.e2 * np.sin(lat) ** 2
-    r_n = earth.a / np.sqrt(w2)
-    r_m = r_n * (1.0 - earth.e2) / w2
+    place = interpolate_positions(truth, valid_ns)
+    fix = _displaced(place, error, earth)
     seen = np.ones(t.size, bool)
     for start, end in model.outages:
         seen &= ~((t >= start) & (t < end))
     v_n = None
     sigma_v = None
     if model.velocity_noise is not None:
-        v_n = (velocity_at(truth, valid_ns) + model.velocity_noise * velocity_error)[seen]
+        v_n = _in_axes_of(fix, place, velocity_at(truth, valid_ns))
+        v_n = (v_n + model.velocity_noise * velocity_error)[seen]
         sigma_v = np.tile(model.velocity_noise * axes, (v_n.shape[0], 1))
     sigma = float(np.hypot(model.noise, model.drift)) * axes
     return Gnss(
         t_ns=(valid_ns + np.int64(round(model.latency * 1e9)))[seen],
-        lat=(lat + error[:, 1] / (r_m + height))[seen],
-        lon=(lon + error[:, 0] / ((r_n + height) * np.cos(lat)))[seen],
-        height=(height + error[:, 2])[seen],
+        lat=fix[0][seen],
+        lon=fix[1][seen],
+        height=fix[2][seen],
         v_n=v_n,
         sigma_pos=np.tile(sigma, (int(np.count_nonzero(seen)), 1)),
         sigma_vel=sigma_v,
         source="/gps/fix",
     )
+
+
+def _displaced(place: Place, error: Array, earth: Ellipsoid) -> Place:
+    """Places (lat, lon, height) off by ``error`` (m, 3), m, east, north and up.
+
+    Near the poles east and north are those of the first place: an error does not turn round
+    because the axes do.
+    """
+    lat, lon, height = place
+    w2 = 1.0 - earth.e2 * np.sin(lat) ** 2
+    r_n = earth.a / np.sqrt(w2)
+    r_m = r_n * (1.0 - earth.e2) / w2
+    new_lat = lat + error[:, 1] / (r_m + height)
+    new_lon = lon + error[:, 0] / ((r_n + height) * np.cos(lat))
+    new_height = height + error[:, 2]
+    polar = np.abs(lat) > POLAR
+    if np.any(polar):
+        r_e = ecef_from_geodetic(lat[polar], lon[polar], height[polar], earth=earth)
+        r_e = r_e + error[polar] @ c_en(lat[0], lon[0]).T
+        new_lat[polar], new_lon[polar], new_height[polar] = geodetic_from_ecef(r_e, earth=earth)
+    return new_lat, new_lon, new_height
+
+
+def _in_axes_of(fix: Place, place: Place, v_n: Array) -> Array:
+    """Velocities at ``place``; near the poles in the axes of the fix, as a receiver gives them."""
+    polar = np.abs(place[0]) > POLAR
+    if not np.any(polar):
+        return v_n
+    turn = turn_of_axes(place[0][polar], place[1][polar], fix[0][polar], fix[1][polar])
+    out = v_n.copy()
+    out[polar] = np.einsum("kij,kj->ki", turn, v_n[polar])
+    return out
 
 
 def _markov(t: Array, normal: Array, *, time: float) -> Array:

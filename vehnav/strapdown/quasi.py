@@ -8,7 +8,7 @@ approximations that the paper prints, (13) and (14), are kept as functions with 
 
 from __future__ import annotations
 
-from typing import Final
+from typing import Final, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -16,6 +16,7 @@ import numpy.typing as npt
 from vehnav.earth import WGS84, Ellipsoid, ecef_from_geodetic, geodetic_from_ecef
 
 Array = npt.NDArray[np.float64]
+Azimuth = Literal["relative", "absolute"]
 
 C_QE: Final = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
 """S of (1): Earth-fixed to quasi-Greenwich axes. The North pole gets (lat_q, lon_q) = (0, 0)."""
@@ -69,6 +70,33 @@ def gyro_heading(c_wb: npt.ArrayLike) -> Array:
 def quasi_heading(c_we: npt.ArrayLike, c_wb: npt.ArrayLike) -> Array:
     """Heading from quasi-north, rad in [0, 2 pi) (17): gyro heading minus quasi-wander angle."""
     return np.asarray(np.remainder(gyro_heading(c_wb) - quasi_wander(c_we), 2.0 * np.pi))
+
+
+def wander_along(
+    t: npt.ArrayLike,
+    lat: npt.ArrayLike,
+    lon: npt.ArrayLike,
+    *,
+    azimuth: Azimuth = "relative",
+    earth: Ellipsoid = WGS84,
+) -> Array:
+    """Wander angle (n,), rad, of axes free in azimuth that are carried along a track (4), (5).
+
+    They point east and north at the first instant. ``lon + wander`` changes by (1 - sin lat) times
+    the longitude: regular at the North pole, as is ``lon - wander`` at the South pole.
+
+    Parameters
+    ----------
+    t, lat, lon : (n,)
+        s, rad, rad.
+    azimuth : {"relative", "absolute"}
+        Free relative to the Earth or to inertial space.
+    """
+    t, lat, lon = (np.asarray(x, float) for x in (t, lat, lon))
+    s = np.sin(0.5 * (lat[1:] + lat[:-1]))
+    d_lon = np.remainder(np.diff(lon) + np.pi, 2.0 * np.pi) - np.pi
+    u = earth.omega_ie if azimuth == "absolute" else 0.0
+    return np.concatenate([[0.0], np.cumsum(-s * (d_lon + u * np.diff(t)))])
 
 
 def geocentric_latitude_approximation(lat: npt.ArrayLike, *, earth: Ellipsoid = WGS84) -> Array:
