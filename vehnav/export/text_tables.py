@@ -116,7 +116,7 @@ def read_json(path: Path) -> Trajectory:
     return from_columns(t_ns, floats, where=str(path))
 
 
-def _parquet(path: Path) -> Any:
+def parquet_library(path: Path) -> Any:
     """The modules of pyarrow, or an error that says what to install."""
     try:
         import pyarrow
@@ -130,7 +130,7 @@ def _parquet(path: Path) -> Any:
 
 def write_parquet(trajectory: Trajectory, path: Path, *, unix_clock: bool = True, **_: Any) -> None:
     """The columns of the CSV as float64, and ``t_ns`` as int64 instead of ``time_s``."""
-    pa = _parquet(path)
+    pa = parquet_library(path)
     columns = {"t_ns": trajectory.t_ns, **to_columns(trajectory), "stopped": trajectory.stopped}
     table = pa.table(columns)
     clock = b"unix" if unix_clock else b"log"
@@ -140,7 +140,7 @@ def write_parquet(trajectory: Trajectory, path: Path, *, unix_clock: bool = True
 
 def read_parquet(path: Path) -> Trajectory:
     """The table of :func:`write_parquet`."""
-    pa = _parquet(path)
+    pa = parquet_library(path)
     try:
         table = pa.parquet.read_table(path)
     except (pa.ArrowException, OSError) as error:
