@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable
 from typing import Final
 
-from vehnav.batch.model import MAIN_METRIC, BarResult, Result
+from vehnav.batch.model import MAIN_METRIC, BarResult, Result, Results
 from vehnav.batch.regression import Change, Comparison, Paired, Turned
 
 UNITS: Final = (("_m_s", "m/s"), ("_deg", "deg"), ("percent", "%"), ("_m", "m"), ("_s", "s"))
@@ -163,12 +163,52 @@ def remarks(item: Comparison, *, most: int = 5) -> list[str]:
     return out
 
 
+def headline(results: Results) -> str:
+    """How many passed, and what became of the others."""
+    rows = results.results
+    logs, configs = len({r.log for r in rows}), len({r.config for r in rows})
+    what = _count(logs, "log") + (f" with {configs} configurations" if configs > 1 else "")
+    passed = sum(r.passed for r in rows)
+    far = sum(missed(r) > 0 for r in rows)
+    parts = [f"{passed} of {len(rows)} passed" if passed < len(rows) else f"all {passed} passed"]
+    parts += [f"{far} missed a bar"] * (far > 0)
+    for status, text in STATES.items():
+        count = sum(r.status == status for r in rows)
+        if count and status != "ok":
+            parts.append(f"{count} {text}")
+    return f"{what}: {', '.join(parts)}" if rows else "no logs"
+
+
+def _count(number: int, what: str) -> str:
+    return f"1 {what}" if number == 1 else f"{number} {what}s"
+
+
+def gate_text(item: Comparison) -> str:
+    """What the comparison with the baseline came to."""
+    failed = len(regressions(item))
+    if item.max_regression is None:
+        return f"compared with {item.path}, nothing is gated"
+    limits = f"{100.0 * item.max_regression:g} % in the median"
+    if item.max_log_regression is not None:
+        limits += f", {100.0 * item.max_log_regression:g} % for a log"
+    text = _count(failed, "regression") if failed else "no regression"
+    return f"{text} against {item.path} ({limits})"
+
+
 # ---- order -------------------------------------------------------------------------------------
 
 
 def missed(result: Result) -> int:
     """How many bars it missed; a log that did not run has missed none but itself."""
     return sum(not bar.passed for bar in result.bars) if result.status == "ok" else 0
+
+
+def main_metric(results: Iterable[Result]) -> str:
+    """The figure that a page shows of every log: the largest error, else what has a bar."""
+    rows = list(results)
+    if any(r.metrics.get(MAIN_METRIC) is not None for r in rows):
+        return MAIN_METRIC
+    return next((bar.metric for r in rows for bar in r.bars), MAIN_METRIC)
 
 
 def worst_first(results: Iterable[Result], metric: str = MAIN_METRIC) -> list[Result]:
