@@ -65,6 +65,10 @@ REAL = [
         mount=(0.0, -11.0, 0.0),
     ),
     Real("mcap_by_others/rhoque_car_circles.mcap", "FRD", "turns", mount=(0.0, -7.0, 0.0)),
+    Real(f"{BOSTON}going_in_circles.mcap", "FRD", "turns"),  # never stands
+    Real(f"{BOSTON}going_in_circles_imu.csv", "FRD", "turns"),
+    Real("kitti_oxts/2011_10_03_drive_0042.mcap", "FLU", "GPS"),  # motorway, no stop
+    Real("ugv_robot_localization/imu.csv", "FLU", EVENTS),  # one departure, after 0.9 s
 ]  # fmt: skip
 
 

@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+import json
+from pathlib import Path
+
 import numpy as np
 import pytest
+from click.testing import CliRunner
 
+from vehnav.cli.main import cli
 from vehnav.config import Config
 from vehnav.library import read_log
 from vehnav.pipeline import Run, run
@@ -103,3 +108,81 @@ def test_no_option_is_needed(boston, shared_data) -> None:
     alone = found(shared_data, "boston_apan/driving.mcap")
     assert alone.orientation.axes == "FRD"
     assert end(alone, "default") == pytest.approx(end(boston, "default"), abs=5.0)
+
+
+# ---- every recording without an option ----------------------------------------------------------
+
+NO_STOP = "no stop was found"
+OUTCOMES = {
+    "boston_apan/driving.mcap": (0, "FRD"),
+    "boston_apan/driving_imu.csv": (0, "FRD"),
+    "boston_apan/going_in_circles.mcap": (2, NO_STOP),
+    "boston_apan/going_in_circles_imu.csv": (2, NO_STOP),
+    "boston_ramirez_1hz/imu.csv": (2, "runs at 1.00 Hz"),
+    "dresden_balzer/2014-03-26-000-Data.full.csv": (0, "FLU BRD"),
+    "drive_0708/drive_0708.mcap": (0, "BRU"),
+    "drive_0708/imu.csv": (0, "BRU"),
+    "kitti_oxts/2011_09_30_drive_0018.mcap": (0, "FLU"),
+    "kitti_oxts/2011_09_30_drive_0018_imu.csv": (0, "FLU"),
+    "kitti_oxts/2011_09_30_drive_0027.mcap": (0, "FLU"),
+    "kitti_oxts/2011_09_30_drive_0027_imu.csv": (0, "FLU"),
+    "kitti_oxts/2011_10_03_drive_0042.mcap": (2, NO_STOP),
+    "kitti_oxts/2011_10_03_drive_0042_imu.csv": (2, NO_STOP),
+    "mcap_by_others/evo_nav2_turtlebot.mcap": (2, "/odom (nav_msgs/msg/Odometry)"),
+    "mcap_by_others/foxglove_tutorial.mcap": (2, "no IMU found; it has battery"),
+    "mcap_by_others/hansmann_navsatfix_50min.mcap": (2, "sensor_msgs/msg/NavSatFix"),
+    "mcap_by_others/rhoque_car_circles.mcap": (0, "FRD"),
+    "mcap_by_others/rosbagsrs_all_types_no_statistics.mcap": (2, "2 IMU samples"),
+    "mcap_by_others/sarthak_no_messages.mcap": (2, "no messages"),
+    "mcap_by_others/sarthak_zero_bytes.mcap": (2, "empty (0 bytes)"),
+    "ugv_robot_localization/imu.csv": (0, "FLU"),
+}
+"""Exit status, and the axes in force or what is said."""
+NO_IMU = ("_gps.csv", "_truth.csv", "/gps.csv", "/wheel_odometry.csv")
+
+
+def test_the_table_has_every_recording(shared_data) -> None:
+    files = {
+        path.relative_to(shared_data).as_posix()
+        for suffix in ("mcap", "csv")
+        for path in Path(shared_data).rglob(f"*.{suffix}")
+    }
+    assert {file for file in files if not file.endswith(NO_IMU)} == set(OUTCOMES)
+
+
+def run_alone(file: Path, folder: Path) -> tuple[int, str, Path]:
+    """``vehnav run FILE``, with nothing said but where its results go."""
+    result = CliRunner().invoke(cli, ["run", str(file), "--out-dir", str(folder)])
+    return result.exit_code, result.stderr, folder / "report.json"
+
+
+@pytest.mark.parametrize("file", [file for file, (status, _) in OUTCOMES.items() if status])
+def test_what_cannot_run_exits_2_and_says_what_is_there(shared_data, tmp_path, file) -> None:
+    status, said, report = run_alone(shared_data / file, tmp_path)
+    assert status == 2
+    assert OUTCOMES[file][1] in said
+    if OUTCOMES[file][1] == NO_STOP:
+        assert "--method filter" in said
+        assert "--start-attitude" in said
+    assert not report.exists()
+
+
+@pytest.mark.parametrize(
+    "file",
+    [
+        pytest.param(file, marks=[pytest.mark.slow] if file.endswith("_0708.mcap") else [])
+        for file, (status, _) in OUTCOMES.items()
+        if not status
+    ],
+)
+def test_every_recording_runs_without_an_option(shared_data, tmp_path, file) -> None:
+    status, said, report = run_alone(shared_data / file, tmp_path)
+    assert status == 0, said
+    document = json.loads(report.read_text())
+    axes, _, accel_axes = OUTCOMES[file][1].partition(" ")
+    assert document["input"]["axes"] == axes
+    assert document["input"]["accel_axes"] == (accel_axes or None)
+    assert document["trajectory"]["distance_m"] > 100.0
+    codes = {finding["code"] for finding in document["input"]["findings"]}
+    assert ("local-frame" in codes) == (document["gps"]["used_for"] == [])
+    assert ("short-stop" in codes) == file.startswith("ugv")

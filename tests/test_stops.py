@@ -15,9 +15,11 @@ from vehnav.logs.read import read_log
 from vehnav.pipeline import StopSearch, search_stops
 from vehnav.stops import (
     RMS_RULE,
+    SHORT_REST,
     StopRule,
     find_stops,
     quiet_bias,
+    short_start,
     stop_numbers,
     stop_statistics,
     stopped_mask,
@@ -129,6 +131,68 @@ def test_no_stop_in_a_log_that_never_rests() -> None:
     t, omega, f = signals(straight_log())
     f = f + 0.5 * np.sin(2 * np.pi * 0.7 * t)[:, None]
     assert find_stops(t, omega, f, StopRule()) == []
+
+
+# ---- a start with less rest than the rule wants ------------------------------------------------
+
+
+def leaving(rest: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Sixty seconds that begin with ``rest`` seconds of standing; noise of a MEMS."""
+    t = np.arange(0.0, 60.0, 0.01)
+    rng = np.random.default_rng(2)
+    omega = np.radians(0.1) * rng.normal(size=(t.size, 3)) + np.radians([0.5, -0.3, 0.1])
+    f = 0.02 * rng.normal(size=(t.size, 3)) + [0.0, 0.0, 9.81]
+    moving = np.clip(t - rest, 0.0, None)
+    omega[:, 2] += np.radians(3.0) * np.sin(1.5 * moving)
+    f[:, 1] += np.minimum(1.0, moving)
+    return t, omega, f
+
+
+@pytest.mark.parametrize("rest", [0.7, 1.0, 2.0])
+def test_a_short_rest_at_the_start_is_a_stop_of_that_length(rest) -> None:
+    """It ends within the 0.25 s mean and the 0.1 s steps of where the vehicle leaves."""
+    t, omega, f = leaving(rest)
+    assert find_stops(t, omega, f, StopRule()) == []
+    stop = short_start(t, omega, f, StopRule())
+    assert stop is not None
+    assert stop.start == 0.0
+    assert rest - 0.15 < stop.end < rest + 0.3
+    assert stop.margin < 1.0
+
+
+def test_a_start_under_way_is_none() -> None:
+    for rest in (0.0, 0.2):
+        assert short_start(*leaving(rest), StopRule()) is None
+    t, omega, f = leaving(2.0)
+    assert short_start(t, omega, f, RMS_RULE) is None
+    assert short_start(t[::20], omega[::20], f[::20], StopRule()) is None  # 5 Hz: too few samples
+
+
+@pytest.mark.parametrize(
+    "file",
+    [
+        "kitti_oxts/2011_10_03_drive_0042.mcap",
+        "kitti_oxts/2011_09_30_drive_0018.mcap",
+        "boston_apan/going_in_circles.mcap",
+        "boston_apan/driving.mcap",
+        "drive_0708/drive_0708.mcap",
+        "dresden_balzer/2014-03-26-000-Data.full.csv",
+    ],
+)
+def test_a_log_that_starts_in_motion_anywhere_has_no_short_start(shared_data, file) -> None:
+    """Cut every 0.3 s in motion: on motorway and circles nowhere; in town, where boston creeps
+    between two stops, in less than one place of a hundred.
+    """
+    t, omega, f = signals(read_log(str(shared_data / file), ReadOptions()))
+    numbers = stop_numbers(t.size, find_stops(t, omega, f, StopRule()))
+    starts = np.arange(0, t.size - 300, int(0.3 / np.median(np.diff(t))))
+    cut = int((SHORT_REST + 2.5) / np.median(np.diff(t)))
+    moving = [k for k in starts if np.all(numbers[max(0, k - cut) : k + cut] < 0)]
+    found = [
+        short_start(t[k : k + cut], omega[k : k + cut], f[k : k + cut], StopRule()) for k in moving
+    ]
+    hits = sum(stop is not None for stop in found)
+    assert hits <= (0.01 * len(moving) if "driving" in file else 0)
 
 
 # ---- the judge ---------------------------------------------------------------------------------

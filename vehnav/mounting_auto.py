@@ -323,10 +323,10 @@ def _reasons(
 ) -> list[str]:
     """What the result rests on, a sentence each."""
     reading = ", ".join(f"{x:+.2f}" for x in rest.force)
-    where = f"{rest.stops} stops" if rest.stops else "the whole log (no stop)"
-    reasons = [
-        f"up: ({reading}) m/s2 on x, y, z over {where}, agreeing to {rest.spread / DEG:.1f} deg"
-    ]
+    where = f"over {rest.stops} stops, agreeing to {rest.spread / DEG:.1f} deg"
+    if rest.stops < 2:
+        where = "over one stop" if rest.stops else "over the whole log (no stop)"
+    reasons = [f"up: ({reading}) m/s2 on x, y, z {where}"]
     if events.count:
         reasons.append(
             f"forward: {events.count} departures and arrivals, {events.speed:.1f} m/s in all, "

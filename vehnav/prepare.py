@@ -14,14 +14,22 @@ from vehnav.clues import GpsBetween
 from vehnav.errors import Finding, LogError
 from vehnav.logs.log import MIN_IMU_RATE_HZ, Imu, Log
 from vehnav.orientation import Declared, Orientation, in_si, orient
-from vehnav.stops import Stop, StopRule, StopStatistics, stop_statistics, stops_from_statistics
+from vehnav.stops import (
+    SLOW_MEAN,
+    Stop,
+    StopRule,
+    StopStatistics,
+    short_start,
+    stop_statistics,
+    stops_from_statistics,
+)
 from vehnav.strapdown.increments import (
     Increments,
     gap_steps,
     increments_from_log,
     increments_from_rates,
 )
-from vehnav.units import NS
+from vehnav.units import DEG, DEG_PER_HOUR, NS, STANDARD_GRAVITY
 
 Array = npt.NDArray[np.float64]
 
@@ -147,6 +155,8 @@ def prepare_samples(
     gyro, accel = (imu.gyro, imu.accel) if as_rates else (imu.gyro / dt, imu.accel / dt)
     statistics = stop_statistics(t, gyro, accel, rule)
     stops = stops_from_statistics(t, accel, statistics, rule)
+    if not stops and (start := short_start(t, gyro, accel, rule)) is not None:
+        stops, findings = [start], [*findings, _short_stop(start, imu)]
     orientation = orient(
         imu, t, gyro, accel, stops, declared,
         path=path, units=units, gps=gps, gps_seconds=gps_seconds,
@@ -161,6 +171,20 @@ def prepare_samples(
         )
     everything = (*findings, *orientation.findings, *gaps)
     return Samples(imu.t_ns, t, omega, f, increments, orientation, statistics, stops, everything)
+
+
+def _short_stop(stop: Stop, imu: Imu) -> Finding:
+    """The start was taken for a stop, and what level and gyro bias from it are worth."""
+    independent = max(1.0, stop.duration / SLOW_MEAN)
+    bias = stop.rate / np.sqrt(3.0 * independent) / DEG_PER_HOUR
+    level = stop.force / np.sqrt(3.0 * independent) / STANDARD_GRAVITY / DEG
+    text = (
+        f"no stop of 3 s was found; the first {stop.duration:.1f} s are quiet (the rate varies by "
+        f"{stop.rate / DEG:.2f} deg/s, the force by {stop.force:.3f} m/s2) and were taken for one. "
+        f"Gyro bias and level rest on them alone: by their noise to {bias:.0f} deg/h and "
+        f"{level:.2f} deg, at best; let the vehicle stand for 10 s before it leaves"
+    )
+    return Finding("short-stop", "warning", text, int(imu.t_ns[0]), int(imu.t_ns[stop.last]))
 
 
 def hopeless_gaps(t_ns: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:

@@ -191,9 +191,9 @@ def finding_line(finding: Finding, start_ns: int = 0) -> str:
     when = ""
     if finding.start_ns is not None:
         first = (finding.start_ns - start_ns) * 1e-9
-        when = f" {first:.1f}"
+        when = f" {first:z.1f}"
         if finding.end_ns is not None and finding.end_ns != finding.start_ns:
-            when += f"-{(finding.end_ns - start_ns) * 1e-9:.1f}"
+            when += f"-{(finding.end_ns - start_ns) * 1e-9:z.1f}"
         when += " s:"
     return f"{finding.level}: [{finding.code}]{when} {finding.text}"
 

@@ -228,7 +228,7 @@ def _record_lines(found: Mapping[str, Any]) -> list[str]:
             lines.append(f"{label:<11}none")
             continue
         rate = "" if record["rate_hz"] is None else f" at {record['rate_hz']:.2f} Hz"
-        text = f"{record['count']}{rate}, {record['start_s']:.1f} to {record['end_s']:.1f} s"
+        text = f"{record['count']}{rate}, {record['start_s']:z.1f} to {record['end_s']:z.1f} s"
         if record["longest_step_s"] is not None:
             text += f", {record['gaps']} gaps, longest step {record['longest_step_s']:.3f} s"
         if name == "gps":
@@ -246,7 +246,7 @@ def _stop_lines(found: Mapping[str, Any]) -> list[str]:
     total = sum(stop["end_s"] - stop["start_s"] for stop in stops)
     text = f"stops      {len(stops)}, {total:.0f} s in all"
     if stops:
-        shown = ", ".join(f"{s['start_s']:.0f}-{s['end_s']:.0f}" for s in stops[:6])
+        shown = ", ".join(f"{s['start_s']:z.0f}-{s['end_s']:z.0f}" for s in stops[:6])
         text += f": {shown}{' ...' if len(stops) > 6 else ''} s"
     score = found["gps_score"]
     if score is None or score["found"] is None:
