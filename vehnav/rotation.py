@@ -250,3 +250,15 @@ def c_from_quaternion(q: npt.ArrayLike) -> Array:
         [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)],
     ]
     return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+
+
+def rotvec_from_c(c: npt.ArrayLike) -> Array:
+    """Rotation vectors (..., 3), rad, at most pi long, of rotation matrices (..., 3, 3).
+
+    >>> rotvec_from_c(c_from_rotvec([0.1, -0.2, 0.3])).round(12).tolist()
+    [0.1, -0.2, 0.3]
+    """
+    q = quaternion_from_c(c)
+    size = np.linalg.norm(q[..., 1:], axis=-1, keepdims=True)
+    angle = 2.0 * np.arctan2(size, q[..., :1])
+    return np.asarray(q[..., 1:] * np.where(size > 0.0, angle / np.maximum(size, 1e-300), 2.0))

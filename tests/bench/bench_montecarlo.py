@@ -41,7 +41,7 @@ def cpu_seconds(run: Callable[[], Any]) -> float:
 def main() -> bool:
     """Print the figures; whether runs on threads equal the same runs one after the other."""
     from vehnav.earth import WGS84
-    from vehnav.papers.parallel import cores
+    from vehnav.parallel import cores
     from vehnav.strapdown.enu import integrate_enu
 
     runs = [noisy(drive(SAMPLES), seed) for seed in range(RUNS)]

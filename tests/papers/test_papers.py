@@ -115,7 +115,7 @@ def test_paper_004_sees_another_noise(monkeypatch):
 def test_monte_carlo_is_the_same_on_any_number_of_cores(monkeypatch):
     circle = paper004.drive("circle,lat=47.2", 100.0, 0.1)
     many = paper004.ends(circle, 4, 1e-3, earth=KRASOVSKY)
-    monkeypatch.setattr("vehnav.papers.parallel.cores", lambda: 1)
+    monkeypatch.setattr("vehnav.parallel.cores", lambda: 1)
     np.testing.assert_array_equal(paper004.ends(circle, 4, 1e-3, earth=KRASOVSKY), many)
     np.testing.assert_array_equal(paper004.ends(circle, 2, 1e-3, earth=KRASOVSKY), many[:2])
 

@@ -39,7 +39,7 @@ import numpy.typing as npt
 
 from vehnav.earth import WGS84, Ellipsoid, curvature_radii, normal_gravity
 from vehnav.kernel import kernel
-from vehnav.rotation import Mat3, Vec3, skew
+from vehnav.rotation import Mat3, Vec3
 from vehnav.strapdown.wander import curvature, earth_axis, gravity_at, mat3, relative_rate
 
 Array = npt.NDArray[np.float64]
@@ -186,6 +186,75 @@ def total_velocity_error(x: Array, v_w: npt.ArrayLike, k: Vec3) -> Array:
     return np.asarray(x[VELOCITY] + np.cross(np.asarray(v_w, float), beta_from_states(x, k)))
 
 
+SIMPLIFIED, PAPER, FULL = 0, 1, 2
+"""How much of the model of paper 001 is kept (:func:`error_matrix_001`)."""
+MODELS: Final = {"simplified": SIMPLIFIED, "paper": PAPER, "full": FULL}
+
+
+@kernel
+def fill_error_matrix_001(
+    f: Array, lat: float, h: float, v: Vec3, f_n: Vec3, kept: int, held: bool, earth: Ellipsoid
+) -> None:
+    """Write F (9, 9) of :func:`error_matrix_001` into ``f``; ``kept``: a value of MODELS."""
+    for i in range(9):
+        for j in range(9):
+            f[i, j] = 0.0
+    r_m, r_e = curvature_radii(lat, h, earth)
+    sin, cos = math.sin(lat), math.cos(lat)
+    tan = sin / cos
+    u_n, u_u = earth.omega_ie * cos, earth.omega_ie * sin
+    v_e, v_n, v_u = v
+    w_e, w_n, w_u = -v_n / r_m, v_e / r_e, v_e * tan / r_e
+    i_n, i_u = u_n + w_n, u_u + w_u
+    f[0, 1], f[0, 2] = i_u, -i_n  # Psi x omega_in
+    f[1, 0], f[1, 2] = -i_u, w_e
+    f[2, 0], f[2, 1] = i_n, -w_e
+    f[3, 1], f[3, 2] = -f_n[2], f_n[1]  # n x Psi
+    f[4, 0], f[4, 2] = f_n[2], -f_n[0]
+    f[5, 0], f[5, 1] = -f_n[1], f_n[0]
+    f[6, 3], f[7, 4], f[8, 5] = 1.0, 1.0, 1.0
+    if kept != SIMPLIFIED:  # Delta omega_ie + Delta omega_en
+        f[0, 4], f[1, 3], f[2, 3] = -1.0 / r_m, 1.0 / r_e, tan / r_e
+        f[1, 7] = -u_u / r_m
+        f[2, 7] = (u_n + v_e / (r_e * cos * cos)) / r_m
+        f[0, 8], f[1, 8], f[2, 8] = v_n / (r_m * r_m), -w_n / r_e, -w_u / r_e
+    if kept == FULL:
+        _add_delta_w(f, v, (w_e, w_n, w_u), (u_n, u_u), r_m, r_e, tan)
+        f[5, 8] += 2.0 * normal_gravity(lat, h, earth) / math.sqrt(r_m * r_e)
+        f[6, 6] += v_u / r_e - v_n * tan / r_m
+        f[6, 7] += v_e * tan / r_m
+        f[6, 8] -= v_e / r_e
+        f[7, 7] += v_u / r_m
+        f[7, 8] -= v_n / r_m
+    if held:
+        for j in range(9):
+            f[5, j], f[8, j] = 0.0, 0.0
+
+
+@kernel
+def _add_delta_w(
+    f: Array, v: Vec3, w: Vec3, u: tuple[float, float], r_m: float, r_e: float, tan: float
+) -> None:
+    """V x (2 Delta omega_ie + Delta omega_en) - (2 omega_ie + omega_en) x Delta v (001 eq. 9)."""
+    v_e, v_n, v_u = v
+    for j in range(3, 9):
+        # the rows of Psi hold Delta omega_ie + Delta omega_en already; Delta omega_ie once more
+        d_e, d_n, d_u = f[0, j], f[1, j], f[2, j]
+        if j == 7:
+            d_n -= u[1] / r_m
+            d_u += u[0] / r_m
+        f[3, j] += v_n * d_u - v_u * d_n
+        f[4, j] += v_u * d_e - v_e * d_u
+        f[5, j] += v_e * d_n - v_n * d_e
+    c_e, c_n, c_u = w[0], w[1] + 2.0 * u[0], w[2] + 2.0 * u[1]
+    f[3, 4] += c_u
+    f[3, 5] -= c_n
+    f[4, 3] -= c_u
+    f[4, 5] += c_e
+    f[5, 3] += c_n
+    f[5, 4] -= c_e
+
+
 def error_matrix_001(
     *,
     lat: float,
@@ -211,33 +280,8 @@ def error_matrix_001(
     held : bool
         Whether height and vertical velocity come from outside.
     """
-    v_e, v_north, v_u = (float(x) for x in np.asarray(v_n, float))
-    r_m, r_e = curvature_radii(lat, height, earth)
-    u, s, c = earth.omega_ie, np.sin(lat), np.cos(lat)
-    tan = s / c
-    ie, en = np.array([0.0, u * c, u * s]), np.array([-v_north / r_m, v_e / r_e, v_e * tan / r_e])
-    # Delta omega_ie = d_ie r, Delta omega_en = d_en_r r + d_en_v dv
-    d_ie, d_en_r, d_en_v = np.zeros((3, 3)), np.zeros((3, 3)), np.zeros((3, 3))
-    d_ie[:, 1] = np.array([0.0, -u * s, u * c]) / r_m
-    d_en_v[0, 1], d_en_v[1, 0], d_en_v[2, 0] = -1.0 / r_m, 1.0 / r_e, tan / r_e
-    d_en_r[2, 1] = v_e / (r_e * c * c) / r_m
-    d_en_r[:, 2] = [v_north / r_m**2, -v_e / r_e**2, -v_e * tan / r_e**2]
     f = np.zeros((9, 9))
-    psi, dv, dr = slice(0, 3), slice(3, 6), slice(6, 9)
-    f[psi, psi] = -skew(ie + en)  # Psi x omega_in
-    f[dv, psi] = skew(np.asarray(f_n, float))  # n x Psi
-    f[dr, dv] = np.eye(3)
-    if model != "simplified":
-        f[psi, dv], f[psi, dr] = d_en_v, d_ie + d_en_r
-    if model == "full":
-        v_x = skew([v_e, v_north, v_u])
-        f[dv, dv] = v_x @ d_en_v - skew(2.0 * ie + en)
-        f[dv, dr] = v_x @ (2.0 * d_ie + d_en_r)
-        f[5, 8] += 2.0 * normal_gravity(lat, height, earth) / np.sqrt(r_m * r_e)
-        f[6, 6:9] += [v_u / r_e - v_north * tan / r_m, v_e * tan / r_m, -v_e / r_e]
-        f[7, 7:9] += [v_u / r_m, -v_north / r_m]
-    if held:
-        f[5], f[8] = 0.0, 0.0
+    fill_error_matrix_001(f, lat, height, _tuple3(v_n), _tuple3(f_n), MODELS[model], held, earth)
     return f
 
 

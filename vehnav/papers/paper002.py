@@ -15,7 +15,7 @@ from vehnav.choices import METHODS
 from vehnav.config import Config
 from vehnav.earth import position_difference
 from vehnav.papers.claims import Row, at_least, at_most
-from vehnav.papers.parallel import by_processes
+from vehnav.parallel import by_processes
 from vehnav.pipeline import Run, run
 from vehnav.rotation import angles_from_c_nb
 from vehnav.simulate.generate import SimulatedLog, simulate

@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from vehnav.earth import KRASOVSKY, Ellipsoid, curvature_radii, normal_gravity, position_difference
 from vehnav.papers.claims import Row, at_most, between, near
-from vehnav.papers.parallel import by_threads
+from vehnav.parallel import by_threads
 from vehnav.simulate.scenarios import make_scenario
 from vehnav.simulate.truth import ideal_record
 from vehnav.strapdown.langevin import integrate, state_vector
