@@ -160,7 +160,7 @@ def _usable(
         return None, None
     fixes = Fixes(
         np.asarray((gnss.t_ns - origin) * NS, np.float64), gnss.lat, gnss.lon, gnss.height,
-        gnss.v_n, gnss.sigma_pos, gnss.sigma_vel,
+        gnss.v_n, gnss.sigma_pos, gnss.sigma_vel, config.gnss_form,
     )  # fmt: skip
     return fixes.take(inside), until
 

@@ -63,6 +63,8 @@ class Config:
         s
     gps : {"start", "none", "aid"}
         What the solution may take from GPS.
+    gnss_form : {"direct", "normal", "quasi"}
+        How the filter compares fixes with its state (paper 003).
     outage : tuple of str
         Stretches, s from the start of the log, whose fixes do not aid: ``A:B`` or
         ``every=180,length=60,from=60``.
@@ -102,6 +104,7 @@ class Config:
     stop_window: float | None = None
     stop_dwell: float | None = None
     gps: Literal["start", "none", "aid"] = "start"
+    gnss_form: Literal["direct", "normal", "quasi"] = "direct"
     outage: tuple[str, ...] = ()
     gps_start_seconds: float = 60.0
     start_position: tuple[float, float, float] | None = None

@@ -9,6 +9,7 @@ import numpy.typing as npt
 
 from vehnav.aiding.blocks import attitude_of, place_of, velocity_of
 from vehnav.aiding.error_model import fill_error_matrix
+from vehnav.aiding.gnss_forms import position_row, see_fix, velocity_row
 from vehnav.aiding.kalman import propagate, transition_rows, update
 from vehnav.aiding.measurements import (
     gnss_position,
@@ -203,22 +204,29 @@ def from_gnss(
     counts: Array,
     earth: Ellipsoid,
 ) -> None:
-    """A fix: 12 numbers, Earth-fixed position and velocity (NaN: none), and the six variances.
+    """A fix: 13 numbers, Earth-fixed position and velocity (NaN: none), six variances, the form.
 
     Variances are along east, north, up; as the wander axes are turned against them, both
     horizontal ones are taken as their mean.
     """
     place, v = place_of(row), velocity_of(row)
     z = gnss_position(place, row[9], v, (fix[0], fix[1], fix[2]), ago, earth)
+    seen = see_fix(
+        int(fix[12]), place, row[9], v, ((fix[0], fix[1], fix[2]), (fix[3], fix[4], fix[5])), ago,
+        earth,
+    )  # fmt: skip
     flat = 0.5 * (fix[6] + fix[7])
-    for j in range(3):
-        h[:] = 0.0
-        h[j] = 1.0
-        measure(GNSS, x, p, h, z[j], flat if j < 2 else fix[8], noise, kept, counts)
+    for j in range(2):
+        position_row(h, j, seen)
+        measure(GNSS, x, p, h, seen[0][j], flat, noise, kept, counts)
+    h[:] = 0.0
+    h[2] = 1.0
+    measure(GNSS, x, p, h, z[2], fix[8], noise, kept, counts)
     if not np.isnan(fix[3]):
-        measured = mat_vec(place, (fix[3], fix[4], fix[5]))
         flat = 0.5 * (fix[9] + fix[10])
-        for j in range(3):
-            gnss_velocity(h, j, place, row[9], v, earth)
-            r = flat if j < 2 else fix[11]
-            measure(GNSS_VELOCITY, x, p, h, v[j] - measured[j], r, noise, kept, counts)
+        for j in range(2):
+            velocity_row(h, j, seen, place, row[9], v, earth)
+            measure(GNSS_VELOCITY, x, p, h, seen[0][2 + j], flat, noise, kept, counts)
+        up = mat_vec(place, (fix[3], fix[4], fix[5]))[2]
+        gnss_velocity(h, 2, place, row[9], v, earth)
+        measure(GNSS_VELOCITY, x, p, h, v[2] - up, fix[11], noise, kept, counts)

@@ -48,8 +48,9 @@ class Aids:
         Odometer reading, m/s, NaN: none.
     fix : (m,) int64
         Number of the fix of an epoch, -1: none.
-    fixes : (k, 12)
-        Earth-fixed position and velocity (NaN: none), variances east, north, up of both.
+    fixes : (k, 13)
+        Earth-fixed position and velocity (NaN: none), variances east, north, up of both, and the
+        number of the form (:mod:`vehnav.aiding.gnss_forms`).
     ago : (k,)
         s by which the fix is older than its epoch.
     """

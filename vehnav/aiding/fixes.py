@@ -8,6 +8,7 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
+from vehnav.aiding.gnss_forms import FORMS, Form
 from vehnav.earth import Ellipsoid, c_en, ecef_from_geodetic, local_enu
 
 Array = npt.NDArray[np.float64]
@@ -34,6 +35,8 @@ class Fixes:
     v_n : (k, 3) or None
     sigma_pos, sigma_vel : (k, 3) or None
         East, north, up.
+    form : {"direct", "normal", "quasi"}
+        How the filter compares them with its state (:mod:`vehnav.aiding.gnss_forms`).
     """
 
     t: Array
@@ -43,6 +46,7 @@ class Fixes:
     v_n: Array | None = None
     sigma_pos: Array | None = None
     sigma_vel: Array | None = None
+    form: Form = "direct"
 
     def take(self, index: npt.NDArray[np.bool_]) -> Fixes:
         """Some of the fixes."""
@@ -80,8 +84,9 @@ class Fixes:
         return np.asarray((place[b] - place[a]) / span[:, None])
 
     def table(self, earth: Ellipsoid) -> Array:
-        """(k, 12): Earth-fixed position and velocity (NaN: none), variances of both."""
-        out = np.full((self.t.size, 12), np.nan)
+        """(k, 13): Earth-fixed position and velocity (NaN: none), variances of both, the form."""
+        out = np.full((self.t.size, 13), np.nan)
+        out[:, 12] = FORMS.index(self.form)
         out[:, :3] = ecef_from_geodetic(self.lat, self.lon, self.height, earth=earth)
         out[:, 6:9] = self.sigmas() ** 2
         if self.v_n is not None:

@@ -194,7 +194,7 @@ def put_to_epochs(
     count = np.concatenate([[0], np.cumsum(stopped)])
     still = count[epochs + 1] - count[before] == epochs - before + 1
     reading = _readings(t[epochs], speed)
-    table = np.zeros((0, 12)) if inside is None else inside.table(drive.earth)
+    table = np.zeros((0, 13)) if inside is None else inside.table(drive.earth)
     ago = np.zeros(0) if inside is None else t[at_fix] - inside.t
     return Aids(epochs, still, use.zupt, use.zaru, use.nhc, reading, fix, table, ago)
 

@@ -58,6 +58,7 @@ RUN_FIELDS = (
     "stop_threshold",
     "stop_statistic", "stop_window", "stop_dwell", "gps", "gps_start_seconds", "start_position",
     "start_heading", "start_attitude", "aid", "sensor", "sensor_grade", "azimuth", "outage",
+    "gnss_form",
 )  # fmt: skip
 
 
@@ -156,6 +157,12 @@ RUN_FIELDS = (
     "gps", "--gps", type=click.Choice(["start", "none", "aid"]), default="start",
     show_default=True,
     help="What GPS may be used for: the start, nothing, or aiding all the way (filter, smooth).",
+)  # fmt: skip
+@option(
+    "gps", "--gnss-form", type=click.Choice(["direct", "normal", "quasi"]), default="direct",
+    show_default=True,
+    help="How the filter compares fixes with its state: Earth-fixed vectors, or paper 003's forms "
+    "in latitude and longitude (fails near the poles) or in quasi-coordinates (near 0 N 0 E).",
 )  # fmt: skip
 @option(
     "gps", "--outage", multiple=True, metavar="A:B|every=...",
