@@ -185,15 +185,15 @@ def start_axes(way):
 
 
 def draw_fixes(way, rng, position, velocity):
-    """(k, 12) Earth-fixed position, velocity and variances, at the whole seconds after 0."""
+    """(k, 13) Earth-fixed position, velocity, variances and form, at the whole seconds after 0."""
     at = np.searchsorted(way.t, np.arange(1.0, way.t[-1] + 1e-6) - 1e-6)
     truth = way.truth
-    out = np.empty((at.size, 12))
+    out = np.zeros((at.size, 13))  # the form: direct
     out[:, :3] = ecef_from_geodetic(truth.lat[at], truth.lon[at], truth.height[at])
     out[:, :3] += position * rng.normal(size=(at.size, 3))
     out[:, 3:6] = np.einsum("kij,kj->ki", c_en(truth.lat[at], truth.lon[at]), truth.v_n[at])
     out[:, 3:6] += velocity * rng.normal(size=(at.size, 3))
-    out[:, 6:9], out[:, 9:] = position**2, velocity**2
+    out[:, 6:9], out[:, 9:12] = position**2, velocity**2
     return out
 
 
