@@ -31,9 +31,19 @@ _ENTITIES: Final = (("://", "&#58;//"), ("www.", "www&#46;"), ("@", "&#64;"), ("
 """No links, no mentions of people, no borders of cells."""
 
 
-def write_markdown(results: Results, path: Path, *, comparison: Comparison | None = None) -> None:
-    """The summary as a file beside the reports, linked; it appears whole or not at all."""
-    text = markdown(results, comparison=comparison, base="")
+def write_markdown(
+    results: Results,
+    path: Path,
+    *,
+    comparison: Comparison | None = None,
+    folder: Path | None = None,
+) -> None:
+    """The summary as a file that links the reports; it appears whole or not at all.
+
+    ``folder`` is that of ``results.json``; None: where the summary is.
+    """
+    base = "" if folder is None else f"{Path(os.path.relpath(folder, path.parent)).as_posix()}/"
+    text = markdown(results, comparison=comparison, base=base)
     with atomic_path(path) as temporary:
         temporary.write_text(text, encoding="utf-8", errors="backslashreplace")
 

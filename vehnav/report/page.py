@@ -18,9 +18,13 @@ def section(key: str, title: str, content: str, note: str = "") -> str:
     return f'<section id="{key}"><h2>{esc(title)}</h2>{content}{note}</section>'
 
 
-def page(title: str, body: str) -> str:
-    """The whole document; its policy lets nothing load and no script run but its own."""
-    style, script = _resource("page.css"), _resource("page.js")
+def page(title: str, body: str, *, script: str | None = None, style: str = "") -> str:
+    """The whole document; its policy lets nothing load and no script run but its own.
+
+    ``script`` replaces the one that moves the cursor through map and plots; ``style`` is added.
+    """
+    style = _resource("page.css") + style
+    script = _resource("page.js") if script is None else script
     digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
     policy = (
         "default-src 'none'; img-src data:; style-src 'unsafe-inline'; "
