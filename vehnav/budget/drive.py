@@ -8,7 +8,7 @@ over intervals of about 0.1 s, on which the error equations are integrated.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -77,6 +77,30 @@ class IdealDrive:
     def duration(self) -> float:
         """Length, s."""
         return float(self.t[-1])
+
+    def thinned(self, step: float) -> IdealDrive:
+        """The drive with increments summed over as many steps as fit into ``step`` s."""
+        every = max(1, int(step / float(np.median(self.increments.dt)) + 1e-6))
+        if every == 1:
+            return self
+        index = np.arange(0, self.t.size, every)
+        if index[-1] != self.t.size - 1:
+            index = np.append(index, self.t.size - 1)
+        steps = self.increments
+        return replace(
+            self,
+            increments=Increments(
+                steps.t[index],
+                np.add.reduceat(steps.dtheta, index[:-1], axis=0),
+                np.add.reduceat(steps.dvel, index[:-1], axis=0),
+                np.logical_or.reduceat(steps.coast, index[:-1]),
+            ),
+            lat=self.lat[index],
+            lon=self.lon[index],
+            height=self.height[index],
+            v_n=self.v_n[index],
+            c_nb=self.c_nb[index],
+        )
 
     def path_length(self) -> float:
         """Horizontal way, m."""
