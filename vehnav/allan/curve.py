@@ -44,12 +44,12 @@ class Curve:
     @property
     def tau(self) -> Array:
         """(k,) s."""
-        return self.clusters * self.dt
+        return np.asarray(self.clusters * self.dt, dtype=np.float64)
 
     @property
     def deviation(self) -> Array:
         """(k, a) Allan deviation, unit of the rate."""
-        return np.sqrt(self.variance)
+        return np.asarray(np.sqrt(self.variance), dtype=np.float64)
 
     @property
     def pieces(self) -> IntArray:

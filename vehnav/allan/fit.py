@@ -201,7 +201,11 @@ def fit_axes(curve: Curve, means: PieceMeans | None = None) -> list[AxisFit]:
 def _fit_axis(
     curve: Curve, axis: int, spread: Spread, means: PieceMeans | None, pairs: Structure | None
 ) -> AxisFit:
-    """The shortest clusters are left out until the rest agrees."""
+    """The shortest clusters are left out until the rest agrees; nothing of a dead axis."""
+    if np.min(curve.variance[:LEAST, axis]) <= 0.0:
+        nothing = Figure()
+        tau = float(curve.tau[0])
+        return AxisFit(nothing, nothing, nothing, nothing, None, False, Powers(), tau, tau, 0.0, 0)
     last = int(np.count_nonzero(curve.tau[:-LEAST] <= LATEST))
     for first in range(last + 1):
         data = _Data(curve, axis, first, spread, means, pairs)

@@ -1,0 +1,239 @@
+"""The noise of a sensor from the rest in a log: ``rest_noise(log, config) -> RestNoise``."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+from vehnav.allan import AxisFit, Curve, PieceMeans, allan_curve, fit_axes
+from vehnav.allan.between import FEWEST, Structure, structure
+from vehnav.config import Config
+from vehnav.earth import WGS84, normal_gravity
+from vehnav.errors import Finding, LogError
+from vehnav.logs.log import Log
+from vehnav.pipeline import StopSearch, search_stops
+from vehnav.units import DEG
+
+Array = npt.NDArray[np.float64]
+
+GUARD: Final = 1.0
+"""s left out at both ends of a stop: the car rocks, the driver moves."""
+LOST: Final = 5.0
+"""Median steps without a sample at which a rest is cut in two."""
+SHORTEST: Final = 2.0
+"""s, the shortest piece that counts."""
+NEEDED: Final = 3.0
+"""s that the longest piece must have: noise from clusters of over a second."""
+DEFAULTS: Final = Config()
+
+
+@dataclass(frozen=True)
+class Instrument:
+    """What the rest shows of three gyroscopes or three accelerometers, on the sensor's own axes.
+
+    Attributes
+    ----------
+    curve : Curve
+    fits : tuple of AxisFit
+        x, y, z.
+    mean : (3,)
+        Over all pieces, by their length; rad/s or m/s2.
+    sample_sigma : (3,)
+        Standard deviation of a sample about the mean of its piece.
+    between : Structure or None
+        Of the means of the pieces, where they count.
+    """
+
+    curve: Curve
+    fits: tuple[AxisFit, ...]
+    mean: Array
+    sample_sigma: Array
+    between: Structure | None
+
+
+@dataclass(frozen=True)
+class RestNoise:
+    """The rest of a log and what it shows of the sensor.
+
+    Attributes
+    ----------
+    log : Log
+    search : StopSearch
+    pieces : (p, 2)
+        s from the start of the log, first and last instant of each.
+    gyro, accel : Instrument
+    gyro_bias : (3,)
+        Mean rates without the Earth's, rad/s.
+    gyro_bias_sigma : (3,)
+        Of that: noise, and the Earth rate on an axis whose heading is not known.
+    gravity : float or None
+        m/s2, where the log says where it was recorded.
+    findings : tuple of Finding
+        Of the log, of its axes and clocks, and of the rest.
+    """
+
+    log: Log
+    search: StopSearch
+    pieces: Array
+    gyro: Instrument
+    accel: Instrument
+    gyro_bias: Array
+    gyro_bias_sigma: Array
+    gravity: float | None
+    findings: tuple[Finding, ...]
+
+    @property
+    def total(self) -> float:
+        """Rest used, s."""
+        return float(np.sum(self.pieces[:, 1] - self.pieces[:, 0]))
+
+    @property
+    def longest(self) -> float:
+        """Longest piece, s."""
+        return float(np.max(self.pieces[:, 1] - self.pieces[:, 0]))
+
+    @property
+    def force_excess(self) -> float | None:
+        """m/s2 by which the force at rest exceeds gravity; None where the place is not known."""
+        if self.gravity is None:
+            return None
+        return float(np.linalg.norm(self.accel.mean)) - self.gravity
+
+
+def rest_noise(log: Log, config: Config = DEFAULTS) -> RestNoise:
+    """Noise, bias and walk of the sensor from every stop of a log.
+
+    Within a stop by the Allan deviation; beyond it by the mean rates of the stops, for the
+    gyroscopes only: the mean of an accelerometer shows the slope of the road.
+
+    Raises
+    ------
+    LogError
+        As :func:`vehnav.pipeline.search_stops`; or the log has no rest of three seconds.
+    """
+    search = search_stops(log, config)
+    samples = search.samples
+    spans = _rest_spans(search)
+    _check_length(log.path, search, spans)
+    t = samples.t
+    dt = sum(t[b] - t[a] for a, b in spans) / sum(b - a for a, b in spans)
+    c_gyro, c_accel = samples.orientation.matrices()
+    gyro, accel = samples.omega @ c_gyro, samples.f @ c_accel  # back to the sensor's own axes
+    start = np.array([t[a] for a, _ in spans]) - 0.5 * dt
+    end = np.array([t[b] for _, b in spans]) + 0.5 * dt
+    lat, gravity = _place(log)
+    up = c_gyro.T @ np.array([0.0, 0.0, 1.0])
+    earth_up, earth_other = _earth_rate(up, lat)
+    rates = [gyro[a : b + 1] for a, b in spans]
+    means = PieceMeans(start, end, np.array([p.mean(axis=0) for p in rates]), earth_other)
+    gyros = _instrument(rates, float(dt), means)
+    accels = _instrument([accel[a : b + 1] for a, b in spans], float(dt), None)
+    return RestNoise(
+        log,
+        search,
+        np.stack([start, end], axis=1),
+        gyros,
+        accels,
+        gyros.mean - earth_up,
+        np.asarray(np.sqrt(earth_other + _mean_variance(gyros, float(np.sum(end - start))))),
+        gravity,
+        (*log.findings, *samples.findings, *_dead_axes(gyros, accels)),
+    )
+
+
+def _rest_spans(search: StopSearch) -> list[tuple[int, int]]:
+    """First and last sample of every piece: the settled inside of a stop, between losses."""
+    t = search.samples.t
+    hole = np.flatnonzero(np.diff(t) > LOST * float(np.median(np.diff(t))))
+    spans = []
+    for stop in search.stops:
+        first = int(np.searchsorted(t, max(stop.start + GUARD, stop.settled), side="left"))
+        last = int(np.searchsorted(t, stop.end - GUARD, side="right")) - 1
+        cuts = hole[(hole >= first) & (hole < last)]
+        edges = [first, *(cuts + 1).tolist(), last + 1]
+        pieces = [(a, b - 1) for a, b in pairwise(edges)]
+        spans += [(a, b) for a, b in pieces if b > a and t[b] - t[a] >= SHORTEST]
+    return spans
+
+
+def _check_length(path: str, search: StopSearch, spans: list[tuple[int, int]]) -> None:
+    """LogError where there is nothing to learn from."""
+    t = search.samples.t
+    longest = max((float(t[b] - t[a]) for a, b in spans), default=0.0)
+    if longest >= NEEDED:
+        return
+    advice = (
+        "Let the vehicle stand for half a minute with the recording running, engine off if you "
+        "can; ten minutes and more show the bias instability too"
+    )
+    if not search.stops:
+        quiet = search.quietest()
+        raise LogError(
+            f"{path}: the vehicle never stands, so nothing tells the sensor's noise from the "
+            f"drive. The quietest moment, at {quiet['time_s']:.1f} s, has {quiet['rate_deg_s']:.3f}"
+            f" deg/s (threshold {search.rule.threshold / DEG:.2f}) and {quiet['force_m_s2']:.3f} "
+            f"m/s2 (threshold {search.statistics.force_threshold:.2f}); raise --stop-threshold if "
+            f"it did stand. {advice}"
+        )
+    stop = max(search.stops, key=lambda s: s.duration)
+    raise LogError(
+        f"{path}: the longest rest, at {stop.start:.1f} s, lasts {stop.duration:.1f} s, of which "
+        f"{longest:.1f} s are settled; {NEEDED:g} s are needed. {advice}"
+    )
+
+
+def _instrument(pieces: list[Array], dt: float, means: PieceMeans | None) -> Instrument:
+    curve = allan_curve(pieces, dt)
+    own = [p.mean(axis=0) for p in pieces]
+    count = np.array([len(p) for p in pieces])
+    squares = sum(((p - m) ** 2).sum(axis=0) for p, m in zip(pieces, own, strict=True))
+    return Instrument(
+        curve,
+        tuple(fit_axes(curve, means)),
+        np.asarray(count @ np.array(own) / count.sum()),
+        np.asarray(np.sqrt(squares / (count.sum() - count.size))),
+        None if means is None or means.start.size < FEWEST else structure(means),
+    )
+
+
+def _mean_variance(item: Instrument, total: float) -> Array:
+    """(3,) variance of the mean over ``total`` s by white noise."""
+    return np.array([(fit.white.value or 0.0) ** 2 / total for fit in item.fits])
+
+
+def _place(log: Log) -> tuple[float | None, float | None]:
+    """Latitude, rad, and gravity, m/s2, by GPS."""
+    if log.gnss is None or log.gnss.t_ns.size == 0:
+        return None, None
+    lat, height = float(np.median(log.gnss.lat)), float(np.median(log.gnss.height))
+    return lat, float(normal_gravity(lat, height, WGS84))
+
+
+def _earth_rate(up: Array, lat: float | None) -> tuple[Array, Array]:
+    """Earth rate on the axes (3,), and the variance (3,) of what an unknown heading leaves.
+
+    The vertical part is known where the latitude is; the level one turns with the vehicle.
+    """
+    level = 1.0 - up**2
+    rate = WGS84.omega_ie
+    if lat is None:
+        return np.zeros(3), np.asarray(rate**2 * (0.5 * level + up**2) / 2.0)
+    return up * rate * np.sin(lat), np.asarray(0.5 * level * (rate * np.cos(lat)) ** 2)
+
+
+def _dead_axes(gyro: Instrument, accel: Instrument) -> list[Finding]:
+    """Axes that hardly ever change at rest: counts larger than the noise, or no sensor."""
+    out = []
+    for name, item in (("gyro", gyro), ("accelerometer", accel)):
+        dead = [axis for axis, fit in zip("xyz", item.fits, strict=True) if fit.white.value is None]
+        if dead:
+            text = (
+                f"{name} {', '.join(dead)}: the reading does not change at rest, so its noise is "
+                "hidden under one count of the output; nothing is said of it"
+            )
+            out.append(Finding("dead-axis", "warning", text))
+    return out
