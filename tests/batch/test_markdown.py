@@ -94,6 +94,8 @@ def test_the_regression_is_said_before_the_logs() -> None:
     assert logs[0][-1] == "against the baseline"
     assert {row[-1] for row in logs[1:] if row[1] == "city"} == {"20.0 % worse"}
     assert {row[-1] for row in logs[1:] if row[1] != "city"} == {"the same"}
+    assert len(logs) == 1 + 10  # all passed their bars: the ten nearest to them
+    assert "20 more are in index" in page.text
     assert page.links == []  # a job summary has nothing beside it to link to
 
 
@@ -132,7 +134,7 @@ def test_the_summary_ends_where_its_room_does(tmp_path) -> None:
     results = suite(rows)
     text = markdown(results, rows=10**6, comparison=compared(results, results))
     assert 0.7 * MIB < len(text.encode()) < MIB
-    left = int(re.search(r"(\d+) more are in the page", text).group(1))
+    left = int(re.search(r"(\d+) more are in index", text).group(1))
     shown = text[text.index("| --- |", text.index("| log |")) :].count("\n| ")
     assert left + shown == 6000
     assert len(markdown(results).encode()) < 0.1 * MIB  # a hundred rows for a person

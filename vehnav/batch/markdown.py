@@ -24,6 +24,8 @@ ROOM: Final = 1024 * 1024 - 4096
 """Bytes that a step may fill, with some left for what others append."""
 ROWS: Final = 100
 """Of a table that is read in a browser."""
+PASSED: Final = 10
+"""Rows of logs that passed: the nearest to failing are of interest, not all."""
 LONGEST: Final = 200
 """Characters of a cell."""
 _SPECIAL: Final = re.compile(r"([\\`*\[\]~$]|(?<![A-Za-z0-9])_|_(?![A-Za-z0-9]))")
@@ -173,22 +175,24 @@ def _logs(
     results: Results, comparison: Comparison | None, base: str | None, most: int, room: int
 ) -> list[str]:
     """The worst logs, as many as fit."""
-    order = wording.worst_first(results.results)
-    if not order:
+    metric = wording.main_metric(results.results)
+    everything = wording.worst_first(results.results, metric)
+    if not everything:
         return []
-    metric = wording.main_metric(order)
+    failed = sum(not r.passed for r in everything)
+    order = everything[: min(most, failed + PASSED)]
     changes: dict[tuple[str, str], Change] = {
         (c.log, c.config): c
         for c in (comparison.changes if comparison is not None else ())
         if c.metric == metric
     }
-    several = len({r.config for r in order}) > 1
+    several = len({r.config for r in everything}) > 1
     head = ["log", "group", *(["configuration"] * several), metric, "bars"]
     head += ["against the baseline"] * (comparison is not None) + ["report"] * (base is not None)
     lines = _table([cell(text) for text in head], (), right=(2 + several,))
     used = len("\n".join(lines).encode()) + LONGEST
     shown = 0
-    for r in order[:most]:
+    for r in order:
         texts = [r.log, r.group, *([r.config] * several), _figure(r, metric)]
         row = [*(cell(text) for text in texts), _bars(r)]
         if comparison is not None:
@@ -204,8 +208,8 @@ def _logs(
         shown += 1
     if used > room and not shown:
         return []
-    left = len(order) - shown
-    return [*lines, "", f"{left} more are in the page and in the table."] if left else lines
+    left = len(everything) - shown
+    return [*lines, "", f"{left} more are in index.html and results.json."] if left else lines
 
 
 def _figure(r: Result, metric: str) -> str:
