@@ -268,7 +268,7 @@ def test_a_short_rest_says_that_it_cannot_tell():
     for fit in fitted(5, [(0.0, 15.0)], white=0.02, bias=0.001, time=300.0):
         assert fit.white.value == pytest.approx(0.02, rel=0.1)
         assert (fit.bias.value, fit.bias.limit) == (None, None)  # 7.5 s show no bias
-        assert fit.walk.limit is not None or fit.walk.value is not None
+        assert (fit.walk.value, fit.walk.limit) == (None, None)
 
 
 def test_engine_vibration_is_left_out_and_does_not_move_the_noise():
@@ -292,6 +292,22 @@ def test_counts_of_the_angle_do_not_move_the_noise():
     for fit in fitted(7, [(0.0, 600.0)], white=0.02, angle=0.01):
         assert fit.angle.value == pytest.approx(0.01, rel=0.1)
         assert fit.white.value == pytest.approx(0.02, rel=0.1)
+
+
+def test_noise_of_the_angle_alone_bounds_the_white_noise():
+    """As of a unit whose own filter corrects its rates: the deviation falls with 1/tau."""
+    _, y = record(np.random.default_rng(8), 30.0, angle=0.01)
+    for fit in fit_axes(allan_curve([y], 1.0 / RATE)):
+        assert fit.angle.value == pytest.approx(0.01, rel=0.1)
+        assert fit.white.value is None
+        assert 0.0 < fit.white.limit < 0.01
+        assert not fit.dead
+
+
+def test_a_reading_that_does_not_change_is_dead():
+    (fit,) = fit_axes(allan_curve([np.zeros((500, 1))], 0.01))
+    assert fit.dead
+    assert fit.white.value is None
 
 
 def test_limits_hold():

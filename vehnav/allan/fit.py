@@ -41,8 +41,8 @@ SEEN: Final = 3.0
 TIMES_PER_DECADE: Final = 8
 PASSES: Final = 3
 """Times the covariance is put to the figures found."""
-QUANTILE: Final = 3.09
-"""Sigmas of chi square from which the shortest clusters contradict the rest (1 in 1000)."""
+QUANTILE: Final = 2.33
+"""Sigmas of chi square from which the shortest clusters contradict the rest (1 in 100)."""
 LEAST: Final = 4
 """Clusters below which nothing can be fitted."""
 ONE_SIDED: Final = 1.645
@@ -88,6 +88,8 @@ class AxisFit:
         s, the longest time seen, in a piece or between two.
     chi_square, freedom : float, int
         Of the fit.
+    dead : bool
+        The reading does not change: nothing was fitted.
     """
 
     white: Figure
@@ -101,6 +103,7 @@ class AxisFit:
     reach: float
     chi_square: float
     freedom: int
+    dead: bool = False
 
 
 @dataclass(frozen=True)
@@ -201,18 +204,27 @@ def fit_axes(curve: Curve, means: PieceMeans | None = None) -> list[AxisFit]:
 def _fit_axis(
     curve: Curve, axis: int, spread: Spread, means: PieceMeans | None, pairs: Structure | None
 ) -> AxisFit:
-    """The shortest clusters are left out until the rest agrees; nothing of a dead axis."""
+    """The shortest clusters are left out until the rest agrees, or agrees best.
+
+    Nothing is said of a dead axis.
+    """
     if np.min(curve.variance[:LEAST, axis]) <= 0.0:
         nothing = Figure()
         tau = float(curve.tau[0])
-        return AxisFit(nothing, nothing, nothing, nothing, None, False, Powers(), tau, tau, 0.0, 0)
+        return AxisFit(
+            nothing, nothing, nothing, nothing, None, False, Powers(), tau, tau, 0.0, 0, True
+        )  # fmt: skip
     last = int(np.count_nonzero(curve.tau[:-LEAST] <= LATEST))
+    trials = []
     for first in range(last + 1):
         data = _Data(curve, axis, first, spread, means, pairs)
         best, growing = _choose(data)
         freedom = max(data.y.size - len(best.kinds) - ("bias" in best.kinds), 1)
-        if best.chi_square <= freedom * _quantile(freedom, QUANTILE):
+        misfit = best.chi_square / (freedom * _quantile(freedom, QUANTILE))
+        trials.append((misfit, data, best, freedom, growing))
+        if misfit <= 1.0:
             break
+    _, data, best, freedom, growing = min(trials, key=lambda trial: max(trial[0], 1.0))
     return _report(data, best, freedom, growing)
 
 
@@ -327,9 +339,9 @@ def _report(data: _Data, best: _Trial, freedom: int, growing: bool) -> AxisFit:
     figures = {kind: Figure() for kind in KINDS}
     for kind in KINDS:
         powers = best.powers
+        if kind in ("bias", "walk") and getattr(powers, kind) == 0.0 and longest.size == 0:
+            continue  # too short to say anything of what is slow
         if kind == "bias" and powers.bias == 0.0:
-            if longest.size == 0:
-                continue
             powers = replace(powers, time=float(longest[0]))
         figures[kind] = _figure(data, kind, powers, swell)
     growing = growing and figures["walk"].value is not None
@@ -347,7 +359,7 @@ def _figure(data: _Data, kind: str, powers: Powers, swell: float) -> Figure:
     """Root of a power with its uncertainty, or the limit of one that is not there."""
     power = getattr(powers, kind)
     sigma = math.sqrt(swell) * _sigma(data, kind, powers)
-    if power > 0.0 and (kind == "white" or power > sigma):
+    if power > sigma:
         return Figure(math.sqrt(power), sigma / (2.0 * math.sqrt(power)))
     return Figure(limit=math.sqrt(_limit(data, kind, powers, power, swell)))
 
@@ -358,9 +370,10 @@ def _limit(data: _Data, kind: str, powers: Powers, power: float, swell: float) -
     A process of which the record holds a few correlation times shows a chi square of as few
     degrees of freedom: it may by chance be far smaller than it is.
     """
-    hidden = max(power, 0.0) + ONE_SIDED * math.sqrt(swell) * _sigma(
-        data, kind, replace(powers, **{kind: 0.0})
-    )
+    others = replace(powers, **{kind: 0.0})
+    if not any(getattr(others, name) for name in KINDS):
+        others = powers
+    hidden = power + ONE_SIDED * math.sqrt(swell) * _sigma(data, kind, others)
     large = 10.0 * hidden
     freedom = 2.0 * (large / _sigma(data, kind, replace(powers, **{kind: large}))) ** 2
     return hidden / max(_quantile(freedom, -ONE_SIDED), SMALLEST_QUANTILE)

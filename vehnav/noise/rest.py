@@ -181,8 +181,8 @@ def _check_length(path: str, search: StopSearch, spans: list[tuple[int, int]]) -
         )
     stop = max(search.stops, key=lambda s: s.duration)
     raise LogError(
-        f"{path}: the longest rest, at {stop.start:.1f} s, lasts {stop.duration:.1f} s, of which "
-        f"{longest:.1f} s are settled; {NEEDED:g} s are needed. {advice}"
+        f"{path}: the longest rest, at {max(stop.start, 0.0):.1f} s, lasts {stop.duration:.1f} s, "
+        f"of which {longest:.1f} s are settled; {NEEDED:g} s are needed. {advice}"
     )
 
 
@@ -229,7 +229,7 @@ def _dead_axes(gyro: Instrument, accel: Instrument) -> list[Finding]:
     """Axes that hardly ever change at rest: counts larger than the noise, or no sensor."""
     out = []
     for name, item in (("gyro", gyro), ("accelerometer", accel)):
-        dead = [axis for axis, fit in zip("xyz", item.fits, strict=True) if fit.white.value is None]
+        dead = [axis for axis, fit in zip("xyz", item.fits, strict=True) if fit.dead]
         if dead:
             text = (
                 f"{name} {', '.join(dead)}: the reading does not change at rest, so its noise is "

@@ -150,7 +150,10 @@ def _gyro_bias(noise: RestNoise, told: dict[str, Figure], untold: dict[str, str]
         root = math.sqrt(square)
         told["gyro_bias"] = Figure(root, root / math.sqrt(6.0))  # three degrees of freedom
     else:
-        untold["gyro_bias"] = "smaller than the Earth rate, whose heading is not known here"
+        untold["gyro_bias"] = (
+            "smaller than its uncertainty, which is noise and, on axes whose heading is not known, "
+            "the Earth rate"
+        )
 
 
 def _why(key: str, kind: str, fits: Sequence[AxisFit], noise: RestNoise) -> str:
@@ -158,7 +161,7 @@ def _why(key: str, kind: str, fits: Sequence[AxisFit], noise: RestNoise) -> str:
     reach = max(fit.reach for fit in fits)
     place = FIELDS[key]
     limits = [f.limit for f in (getattr(fit, kind) for fit in fits) if f.limit is not None]
-    if all(fit.white.value is None for fit in fits):
+    if all(fit.dead for fit in fits):
         return "the readings do not change at rest"
     if kind == "bias" and any(fit.still_growing for fit in fits):
         return (
