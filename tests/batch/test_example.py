@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import os
+import re
 import shutil
 import sys
 import tomllib
 from pathlib import Path
+from urllib.parse import unquote
 
 import pytest
+from click.testing import CliRunner
 
 from vehnav.batch import example
 from vehnav.batch.example import write_example
 from vehnav.batch.suite import Suite, load_suite
+from vehnav.cli.main import cli
 from vehnav.errors import ConfigError
 
 HEAD = "time_s,gyro_x,gyro_y,gyro_z,accel_x,accel_y,accel_z"
@@ -173,3 +177,47 @@ def test_the_real_logs_make_a_suite(shared_data: Path) -> None:
     ]
     truth = [row for row in left_out if row.path.endswith("_truth.csv")]
     assert {row.reason for row in truth} == {"no IMU in it"}
+
+
+# ---- as a user ---------------------------------------------------------------------------------
+
+
+def test_the_command_says_what_it_wrote_and_left_out(tmp_path: Path) -> None:
+    log(tmp_path / "a.csv")
+    (tmp_path / "b.md").write_text("hello")
+    result = CliRunner().invoke(cli, ["score", "--init", str(tmp_path)])
+    assert result.exit_code == 0
+    assert f"{tmp_path / 'suite.toml'}: 1 log; next: vehnav score" in result.stdout
+    assert "left out: b.md: " in result.stderr
+    assert CliRunner().invoke(cli, ["score"]).exit_code == 2
+
+
+@pytest.mark.slow
+def test_the_suite_runs_and_every_output_is_there(sample_logs: Path, tmp_path: Path) -> None:
+    """From a folder of logs to a gate: the example, a baseline, and the same again."""
+    folder = tmp_path / "drives"
+    folder.mkdir()
+    shutil.copy(sample_logs / "city.mcap", folder)
+    assert CliRunner().invoke(cli, ["score", "--init", str(folder)]).exit_code == 0
+    out = tmp_path / "out"
+    baseline = ["--baseline", str(folder / "baseline.json")]
+    command = ["score", str(folder / "suite.toml"), "-o", str(out), "--jobs", "1", *baseline]
+    first = CliRunner().invoke(cli, [*command, "--update-baseline"])
+    assert first.exit_code == 0, first.output
+    names = ["junit.xml", "t.csv", "t.parquet", "s.md"]
+    junit, *tables, markdown = (str(out / name) for name in names)
+    more = ["--junit", junit, "--markdown", markdown, "--max-regression", "0%"]
+    summary = tmp_path / "step.md"
+    again = CliRunner().invoke(
+        cli,
+        [*command, *more, *(part for table in tables for part in ("--table", table))],
+        env={"GITHUB_STEP_SUMMARY": str(summary)},
+    )
+    assert again.exit_code == 0, again.output
+    assert "no regression against" in again.stdout
+    for name in (*names, "index.html", "results.json"):
+        assert (out / name).stat().st_size > 100, name
+    assert "no regression against" in summary.read_text()
+    links = re.findall(r'href="([^"]*report.html)"', (out / "index.html").read_text())
+    assert len(links) == 1
+    assert (out / unquote(links[0])).is_file()

@@ -11,6 +11,7 @@ from batch_for_tests import MAX, RMS, broken, many, ok, suite
 from vehnav.batch.baseline import baseline_of
 from vehnav.batch.model import BarResult, Results
 from vehnav.batch.regression import Comparison, Paired, compare_with
+from vehnav.batch.wording import gate_text, regressions
 from vehnav.batch.worsening import floor_of, worsening
 
 
@@ -206,6 +207,18 @@ def test_new_and_vanished_are_named_and_do_not_fail() -> None:
     assert found.vanished == ("b/default", "b/filter")
 
 
+def test_a_baseline_of_other_logs_does_not_pass_for_a_gate() -> None:
+    before, now = suite([ok("a", 10.0)], "old"), suite([ok("b", 10.0)])
+    found = against(before, now)
+    assert not found.passed
+    assert regressions(found) == [
+        "none of the logs is in the baseline, which is of the suite 'old'"
+    ]
+    assert gate_text(found).startswith("nothing was compared with")
+    assert against(before, now, None).passed
+    assert against(before, suite([ok("a", 10.0), ok("b", 10.0)])).passed
+
+
 def test_another_stretch_judged_is_named() -> None:
     before = suite([ok("a", 10.0), ok("b", 10.0)])
     fewer = {"gps.fixes_judged": 150.0}
@@ -233,8 +246,8 @@ def test_the_document_is_plain_and_the_same_twice() -> None:
     assert texts[0] == texts[1]
     tree = json.loads(texts[0])
     assert set(tree) == {
-        "baseline", "max_regression", "max_log_regression", "passed", "paired", "changes",
-        "status", "new", "vanished", "other_fixes",
+        "baseline", "suite", "compared", "max_regression", "max_log_regression", "passed",
+        "paired", "changes", "status", "new", "vanished", "other_fixes",
     }  # fmt: skip
     assert all(change["worsening"] for change in tree["changes"])
 

@@ -7,7 +7,15 @@ from batch_for_tests import MAX, broken, ok, suite
 
 from vehnav.batch.baseline import baseline_of
 from vehnav.batch.regression import Paired, compare_with
-from vehnav.batch.wording import interval_text, moved, regressions, remarks, short, worst_first
+from vehnav.batch.wording import (
+    headline,
+    interval_text,
+    moved,
+    regressions,
+    remarks,
+    short,
+    worst_first,
+)
 
 
 @pytest.mark.parametrize(
@@ -45,13 +53,38 @@ def test_what_did_not_run_comes_first_then_missed_bars_then_the_largest() -> Non
     assert order == ["dead", "none", "far", "large", "small"]
 
 
+def test_a_group_in_one_sentence() -> None:
+    before = suite(ok(f"{k}", 10.0) for k in range(7))
+    now = suite(ok(f"{k}", 12.0 if k else 9.0) for k in range(7))
+    item = compare_with(baseline_of(before), now, max_regression=0.05)
+    assert regressions(item)[0] == (
+        f"city, default: {MAX} 20.0 % worse in the median of 7 logs "
+        "(95 %: 20.0 % worse; 6 worse, 1 better): regressed"
+    )
+
+
+@pytest.mark.parametrize(
+    ("rows", "text"),
+    [
+        ([], "no logs"),
+        ([ok("a", 1.0)], "1 log: passed"),
+        ([ok("a", 1.0), ok("b", 2.0)], "2 logs: all 2 passed"),
+        (
+            [ok("a", 1.0), ok("a", 99.0, config="x"), broken("b", "timeout")],
+            "2 logs with 2 configurations: 1 of 3 passed, 1 missed a bar, 1 over its time limit",
+        ),
+    ],
+)
+def test_headline(rows, text: str) -> None:
+    assert headline(suite(rows)) == text
+
+
 def test_sentences_of_a_comparison() -> None:
     before = suite([ok("a", 10.0), ok("b", 10.0), broken("c"), ok("d", 1.0)])
     now = suite([ok("a", 20.0), broken("b"), ok("c", 5.0), ok("e", 1.0)])
     item = compare_with(baseline_of(before), now, max_regression=0.05)
     assert regressions(item) == [
-        f"city, default: {MAX} 100 % worse in the median of 1 log (too few logs for an interval; "
-        "1 worse, 0 better): regressed",
+        f"city, default: {MAX} 100 % worse in its only log: regressed",
         "b/default: crashed; in the baseline it ran",
         f"a/default: {MAX} 10 m -> 20 m (100 % worse)",
     ]

@@ -17,7 +17,9 @@ under the floor counts as the floor: figures that are as good as zero may change
 The runs themselves are deterministic, so every change is real; the interval says whether another
 choice of logs would show it.
 
-Logs that only one side has are named and do not fail.
+Logs that only one side has are named and do not fail; a baseline that has none of the logs does,
+since it would gate nothing. Every row is judged by itself: of forty that only scatter, one is
+expected to fail.
 """
 
 from __future__ import annotations
@@ -126,8 +128,10 @@ class Comparison:
 
     Attributes
     ----------
-    path : str
-        The baseline's file.
+    path, suite : str
+        The baseline's file, and the suite that made it.
+    compared : int
+        Logs and configurations that are in both.
     max_regression, max_log_regression : float or None
         The gate in force, as shares; None: nothing is gated.
     changes : tuple of Change
@@ -142,6 +146,8 @@ class Comparison:
     """
 
     path: str
+    suite: str
+    compared: int
     max_regression: float | None
     max_log_regression: float | None
     changes: tuple[Change, ...]
@@ -152,15 +158,22 @@ class Comparison:
     other_fixes: tuple[str, ...]
 
     @property
+    def idle(self) -> bool:
+        """Whether there is a gate, but nothing in common that it could look at."""
+        return self.max_regression is not None and self.compared == 0
+
+    @property
     def passed(self) -> bool:
         """Whether nothing regressed."""
         rows: list[Change | Paired | Turned] = [*self.changes, *self.paired, *self.turned]
-        return not any(row.failed for row in rows)
+        return not self.idle and not any(row.failed for row in rows)
 
     def to_dict(self) -> dict[str, Any]:
         """As plain data; of the changes those that moved."""
         return {
             "baseline": self.path,
+            "suite": self.suite,
+            "compared": self.compared,
             "max_regression": self.max_regression,
             "max_log_regression": self.max_log_regression,
             "passed": self.passed,
@@ -221,6 +234,8 @@ def compare_with(
     there = {(r.log, r.config) for r in results.results}
     return Comparison(
         baseline.path,
+        baseline.suite,
+        len(pairs),
         max_regression,
         max_log_regression,
         tuple(sorted(changes, key=_worst_first)),

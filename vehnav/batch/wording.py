@@ -120,8 +120,10 @@ def _was(status: str) -> str:
 def paired_text(row: Paired) -> str:
     """A figure over the logs of a group."""
     where = row.config if row.group is None else f"{row.group or 'no group'}, {row.config}"
-    logs = "1 log" if row.logs == 1 else f"{row.logs} logs"
-    text = f"{where}: {row.metric} {moved(row.worsening)} in the median of {logs}"
+    text = f"{where}: {row.metric} {moved(row.worsening)}"
+    if row.logs == 1:
+        return f"{text} in its only log: {VERDICTS[row.verdict]}"
+    text += f" in the median of {row.logs} logs"
     text += f" ({interval_text(row)}; {row.worse} worse, {row.better} better)"
     return f"{text}: {VERDICTS[row.verdict]}"
 
@@ -141,7 +143,9 @@ def interval_text(row: Paired) -> str:
 
 def regressions(item: Comparison) -> list[str]:
     """Everything that fails the gate, the suite first."""
+    nothing = f"none of the logs is in the baseline, which is of the suite {item.suite!r}"
     return [
+        *[nothing] * item.idle,
         *(paired_text(p) for p in item.paired if p.failed),
         *(turned_text(t) for t in item.turned if t.failed),
         *(change_text(c) for c in item.changes if c.failed),
@@ -170,7 +174,9 @@ def headline(results: Results) -> str:
     what = _count(logs, "log") + (f" with {configs} configurations" if configs > 1 else "")
     passed = sum(r.passed for r in rows)
     far = sum(missed(r) > 0 for r in rows)
-    parts = [f"{passed} of {len(rows)} passed" if passed < len(rows) else f"all {passed} passed"]
+    parts = [f"{passed} of {len(rows)} passed"]
+    if passed == len(rows):
+        parts = ["passed" if passed == 1 else f"all {passed} passed"]
     parts += [f"{far} missed a bar"] * (far > 0)
     for status, text in STATES.items():
         count = sum(r.status == status for r in rows)
@@ -186,6 +192,8 @@ def _count(number: int, what: str) -> str:
 def gate_text(item: Comparison) -> str:
     """What the comparison with the baseline came to."""
     failed = len(regressions(item))
+    if item.idle:
+        return f"nothing was compared with {item.path}"
     if item.max_regression is None:
         return f"compared with {item.path}, nothing is gated"
     limits = f"{100.0 * item.max_regression:g} % in the median"
