@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Final, Literal
@@ -83,6 +84,15 @@ def between(figure: float, low: float, high: float) -> Verdict:
 def at_least(figure: float, bound: float) -> Verdict:
     """Of a lower bound: reproduced at or above it."""
     return "reproduced" if figure >= bound else "not reproduced"
+
+
+def about(x: float) -> str:
+    """One decimal, or how large it is where no digit means anything.
+
+    >>> about(13.44), about(41234.0)
+    ('13.4', 'over 10000')
+    """
+    return f"{x:.1f}" if x < 100.0 else f"over {10 ** math.floor(math.log10(x))}"
 
 
 def waiting(paper: str, key: str, claim: str, needs: str) -> Row:

@@ -14,7 +14,7 @@ import numpy.typing as npt
 from vehnav.aiding.blocks import ROW, attitude_of, take_off, velocity_of
 from vehnav.aiding.gnss_forms import Form
 from vehnav.earth import WGS84, ecef_from_geodetic
-from vehnav.papers.claims import Row, at_least, at_most, between
+from vehnav.papers.claims import Row, about, at_least, at_most, between
 from vehnav.papers.drawn_runs import Judged, Way, draw_run
 from vehnav.parallel import by_threads
 from vehnav.rotation import angles_from_c_nb, mat_t_vec
@@ -47,7 +47,7 @@ STATES = 13
 
 def rows(*, fast: bool = False) -> list[Row]:
     """The claims of paper 003; ``fast`` takes shorter ways and fewer runs."""
-    duration, runs = (120.0, 20) if fast else (600.0, 40)
+    duration, runs = (100.0, 16) if fast else (600.0, 40)
     return [
         *_crossing(200.0 if fast else 600.0),
         _azimuth_law(),
@@ -252,7 +252,7 @@ def _filter(duration: float, runs: int) -> list[Row]:
             "filter-normal",
             "the traditional corrections (29)-(31) do not",
             "the same runs",
-            f"within 5 s of the pole: mean {nees['normal']:.1e} of 13; at most "
+            f"within 5 s of the pole: mean {about(nees['normal'])} of 13; at most "
             f"{most['normal']:.0f} m off",
             at_least(nees["normal"], 10.0 * STATES),
             "bar: ten times 13; `vehnav run` compares Earth-fixed vectors, regular everywhere",
@@ -288,7 +288,8 @@ def _log_model() -> Row:
         "the model of the log (36), (37) holds in any region: it knows no azimuth and no error of "
         "it",
         "1e-3 rad of azimuth error at 15 m/s",
-        f"{_under(float(change))} m/s in what the log sees, {1000.0 * total:.0f} mm/s in the velocity itself",
+        f"{_under(float(change))} m/s in what the log sees, {1000.0 * total:.0f} mm/s in the "
+        "velocity itself",
         at_most(float(change), SAME, same_size=np.inf),
         f"bar {SAME:g} m/s",
         {"change_m_s": float(change), "velocity_m_s": total},

@@ -16,6 +16,7 @@ import numpy.typing as npt
 
 from vehnav.earth import KRASOVSKY, Ellipsoid, curvature_radii, normal_gravity, position_difference
 from vehnav.papers.claims import Row, at_most, between, near
+from vehnav.papers.langevin_rows import langevin_rows
 from vehnav.parallel import by_threads
 from vehnav.simulate.scenarios import make_scenario
 from vehnav.simulate.truth import ideal_record
@@ -107,6 +108,7 @@ def rows(*, fast: bool = False, earth: Ellipsoid = KRASOVSKY) -> list[Row]:
         partial(_shaken, earth),
         partial(_ratio, earth),
         partial(_noise, earth, 60 if fast else 200),
+        partial(langevin_rows, fast=fast),
     ]
     if not fast:
         claims.append(partial(_readings, earth))

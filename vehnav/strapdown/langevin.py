@@ -100,6 +100,27 @@ def state_rate(
     return rate, dv, poisson_rate(c, omega_b, add(omega_ie_n, omega_en_n))
 
 
+@kernel
+def state_of(y: Array) -> State:
+    """Position, velocity and C_nb of a state Y (15,)."""
+    return (
+        (y[0], y[1], y[2]),
+        (y[3], y[4], y[5]),
+        (y[6], y[9], y[12], y[7], y[10], y[13], y[8], y[11], y[14]),
+    )
+
+
+@kernel
+def write_state(y: Array, state: State) -> None:
+    """Fill a state Y (15,): C_nb by columns."""
+    p, v, m = state
+    y[0], y[1], y[2] = p
+    y[3], y[4], y[5] = v
+    y[6], y[7], y[8] = m[0], m[3], m[6]
+    y[9], y[10], y[11] = m[1], m[4], m[7]
+    y[12], y[13], y[14] = m[2], m[5], m[8]
+
+
 # ---- Runge-Kutta with held measurements --------------------------------------------------------
 
 
@@ -190,13 +211,7 @@ def integrate_langevin(
             else:
                 state = rk4_step(state, dt, inputs, clamp, gravity, earth)
         if k % every == 0:
-            p, v, m = state
-            row = k // every
-            out[row, 0], out[row, 1], out[row, 2] = p
-            out[row, 3], out[row, 4], out[row, 5] = v
-            out[row, 6], out[row, 7], out[row, 8] = m[0], m[3], m[6]
-            out[row, 9], out[row, 10], out[row, 11] = m[1], m[4], m[7]
-            out[row, 12], out[row, 13], out[row, 14] = m[2], m[5], m[8]
+            write_state(out[k // every], state)
 
 
 # ---- the model for Python ----------------------------------------------------------------------

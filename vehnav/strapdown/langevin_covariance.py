@@ -9,12 +9,14 @@ import numpy as np
 import numpy.typing as npt
 
 from vehnav.earth import KRASOVSKY, Ellipsoid, curvature_radii, normal_gravity
-from vehnav.rotation import skew
-from vehnav.strapdown.langevin import F0, NORMAL, GravityInput, c_nb_of
+from vehnav.kernel import kernel
+from vehnav.rotation import Vec3, add, cross, scale
+from vehnav.strapdown.langevin import F0, NORMAL, GravityInput
 
 Array = npt.NDArray[np.float64]
 
 
+@kernel
 def radii_slopes(lat: float, earth: Ellipsoid) -> tuple[float, float]:
     """(dR_M/dlat, dR_N/dlat), m/rad."""
     s, c = math.sin(lat), math.cos(lat)
@@ -24,6 +26,7 @@ def radii_slopes(lat: float, earth: Ellipsoid) -> tuple[float, float]:
     return 3.0 * r_m * earth.e2 * s * c / w2, r_n * earth.e2 * s * c / w2
 
 
+@kernel
 def gravity_slope(lat: float, height: float, earth: Ellipsoid) -> float:
     """Derivative of gamma by latitude, m/s2/rad, of Somigliana with its height term."""
     s, c = math.sin(lat), math.cos(lat)
@@ -35,17 +38,72 @@ def gravity_slope(lat: float, height: float, earth: Ellipsoid) -> float:
     return 2.0 * s * c * relative * normal_gravity(lat, height, earth)
 
 
-def geodetic_slopes(y: Array, earth: Ellipsoid) -> Array:
-    """(2, 6): derivatives of the rates of latitude and longitude (7) by position and velocity."""
-    lat, _, h, v_e, v_n, _ = (float(x) for x in y[:6])
+@kernel
+def rate_slopes(y: Array, earth: Ellipsoid) -> tuple[Vec3, Vec3, Vec3, Vec3]:
+    """What the rates (7) and those of the axes hang on.
+
+    Returns (lat' by lat, h, V_N), (lon' by lat, h, V_E), omega_ie and omega_en, rad/s.
+    """
+    lat, h, v_e, v_n = y[0], y[2], y[3], y[4]
     s, c = math.sin(lat), math.cos(lat)
     r_m, r_n = curvature_radii(lat, h, earth)
     slope_m, slope_n = radii_slopes(lat, earth)
-    out = np.zeros((2, 6))
-    out[0, [0, 2, 4]] = -v_n * slope_m / r_m**2, -v_n / r_m**2, 1.0 / r_m
-    out[1, 0] = v_e / (r_n * c) * (s / c - slope_n / r_n)
-    out[1, [2, 3]] = -v_e / (r_n**2 * c), 1.0 / (r_n * c)
-    return out
+    d_lon = v_e / (r_n * c)
+    by_north = (-v_n * slope_m / (r_m * r_m), -v_n / (r_m * r_m), 1.0 / r_m)
+    by_east = (d_lon * (s / c - slope_n / r_n), -d_lon / r_n, 1.0 / (r_n * c))
+    omega_ie = (0.0, earth.omega_ie * c, earth.omega_ie * s)
+    return by_north, by_east, omega_ie, (-v_n / r_m, d_lon * c, d_lon * s)
+
+
+@kernel
+def fill_jacobian(
+    out: Array, y: Array, z: Array, clamp: bool, gravity: GravityInput, earth: Ellipsoid
+) -> None:
+    """Write A = dF/dY of (16) into ``out`` (15, 15)."""
+    out[:, :] = 0.0
+    by_north, by_east, omega_ie, omega_en = rate_slopes(y, earth)
+    s, c, v = math.sin(y[0]), math.cos(y[0]), (y[3], y[4], y[5])
+    out[0, 0], out[0, 2], out[0, 4] = by_north
+    out[1, 0], out[1, 2], out[1, 3] = by_east
+    out[2, 5] = 1.0
+    for j in range(6):  # rates of the axes: omega_en = (-lat', lon' cos, lon' sin), u (0, cos, sin)
+        en, ie = (-out[0, j], c * out[1, j], s * out[1, j]), (0.0, 0.0, 0.0)
+        if j == 0:
+            d_lon = omega_en[1] / c
+            en = (en[0], en[1] - s * d_lon, en[2] + c * d_lon)
+            ie = (0.0, -omega_ie[2], omega_ie[1])
+        turn = add(ie, en)
+        out[3, j], out[4, j], out[5, j] = cross(v, add(turn, ie))
+        for k in range(3):
+            column = (y[6 + 3 * k], y[7 + 3 * k], y[8 + 3 * k])
+            a = 6 + 3 * k
+            out[a, j], out[a + 1, j], out[a + 2, j] = cross(column, turn)
+    _subtract_skew(out, 3, 3, add(scale(2.0, omega_ie), omega_en))
+    slope = gravity_slope(y[0], gravity.height, earth)
+    out[3, 0] -= slope * gravity.east
+    out[4, 0] -= slope * gravity.north
+    out[5, 0] -= slope
+    for k in range(3):
+        _subtract_skew(out, 6 + 3 * k, 6 + 3 * k, add(omega_ie, omega_en))
+        for a in range(3):
+            out[3 + a, 6 + 3 * k + a] = z[k]
+            n, m = 6 + 3 * ((k + 1) % 3), 6 + 3 * ((k + 2) % 3)  # M' = M [omega_b x]: columns mix
+            out[6 + 3 * k + a, n + a] += z[3 + (k + 2) % 3]
+            out[6 + 3 * k + a, m + a] -= z[3 + (k + 1) % 3]
+    if clamp:
+        out[2, :] = 0.0
+        out[5, :] = 0.0
+
+
+@kernel
+def _subtract_skew(out: Array, row: int, column: int, w: Vec3) -> None:
+    """Take [w x] off a block of three by three."""
+    out[row, column + 1] += w[2]
+    out[row, column + 2] -= w[1]
+    out[row + 1, column] -= w[2]
+    out[row + 1, column + 2] += w[0]
+    out[row + 2, column] += w[1]
+    out[row + 2, column + 1] -= w[0]
 
 
 def jacobian(
@@ -57,32 +115,9 @@ def jacobian(
     earth: Ellipsoid = KRASOVSKY,
 ) -> Array:
     """A = dF/dY (15, 15) of (16): arguments as :func:`vehnav.strapdown.langevin.F`."""
-    y, z = np.asarray(Y, float), np.asarray(Z, float)
-    c_nb, v = c_nb_of(y), y[3:6]
-    s, c = math.sin(y[0]), math.cos(y[0])
-    rates = geodetic_slopes(y, earth)
-    r_m, r_n = curvature_radii(float(y[0]), float(y[2]), earth)
-    d_lat, d_lon, u = v[1] / r_m, v[0] / (r_n * c), earth.omega_ie
-    # omega_en = (-lat', lon' cos, lon' sin) and omega_ie = u (0, cos, sin), by position, velocity
-    en = np.stack([-rates[0], c * rates[1], s * rates[1]])
-    en[:, 0] += d_lon * np.array([0.0, -s, c])
-    ie = np.zeros((3, 6))
-    ie[:, 0] = u * np.array([0.0, -s, c])
-    omega_en, omega_ie = np.array([-d_lat, d_lon * c, d_lon * s]), u * np.array([0.0, c, s])
-
-    out = np.zeros((15, 15))
-    out[:2, :6] = rates
-    out[2, 5] = 1.0
-    out[3:6, :6] = skew(v) @ (2.0 * ie + en)
-    out[3:6, 3:6] -= skew(2.0 * omega_ie + omega_en)
-    slope = gravity_slope(float(y[0]), gravity.height, earth)
-    out[3:6, 0] -= slope * np.array([gravity.east, gravity.north, 1.0])
-    out[3:6, 6:] = np.kron(z[:3], np.eye(3))
-    for j in range(3):
-        out[6 + 3 * j : 9 + 3 * j, :6] = skew(c_nb[:, j]) @ (ie + en)
-    out[6:, 6:] = np.kron(skew(z[3:]).T, np.eye(3)) - np.kron(np.eye(3), skew(omega_ie + omega_en))
-    if vertical == "clamp":
-        out[[2, 5]] = 0.0
+    out = np.empty((15, 15))
+    y, z = np.array(Y, float), np.array(Z, float)
+    fill_jacobian(out, y, z, vertical == "clamp", gravity, earth)
     return out
 
 
