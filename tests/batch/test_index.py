@@ -213,6 +213,20 @@ def test_a_figure_with_a_bar_gets_a_picture_of_its_own() -> None:
     ]
 
 
+def test_the_worst_of_a_score_is_the_smallest() -> None:
+    """Nine scores of 0.9 and one of 0.1, held from below."""
+    rows = []
+    for k in range(10):
+        value = 0.1 if k == 3 else 0.9
+        row = ok(f"{k}", None, more={"stops.f1": value})
+        bars = (BarResult.of("stops.f1", "min", 0.5, value),)
+        rows.append(Result(**{**vars(row), "bars": bars}))
+    text = Page(render_index(suite(rows))).text
+    assert "90 % are over0.820" in text  # linear between the two smallest
+    assert "median log0.900" in text
+    assert "100.9000.8200.100" in text  # 10 logs: median, worst tenth, worst
+
+
 # ---- in a browser ------------------------------------------------------------------------------
 
 

@@ -33,6 +33,8 @@ MOST_LIMITS: Final = 6
 """Bars in a picture; more, for many groups, would hide the curves."""
 MANY: Final = 600
 """Points from which they are drawn smaller."""
+ROOM: Final = 1.1
+"""Between the outermost value and the end of an axis, at least."""
 DECADES: Final = 6
 """Most of an axis, from its upper end: what is smaller stands on its lower end."""
 
@@ -126,6 +128,11 @@ class Pairs:
     failed: Sequence[bool]
 
 
+def _with_room(values: Array) -> Array:
+    """The values and a little beyond both ends of them, so that nothing lies on the frame."""
+    return np.concatenate([values, values / ROOM, values * ROOM])
+
+
 # ---- shares ------------------------------------------------------------------------------------
 
 
@@ -148,7 +155,7 @@ def shares_figure(
     everything = np.concatenate([x for s in series for x in (np.abs(s.values), np.abs(s.before))])
     near = [x for x in {abs(limit) for limit in limits} if x < 10.0 * everything.max(initial=0.0)]
     shown = sorted(near) if len(near) <= MOST_LIMITS else []
-    axis = Axis.of(np.append(everything, [1.2 * x for x in shown]), least=least)
+    axis = Axis.of(_with_room(np.append(everything, shown)), least=least)
     drawn = [_grid(axis, [0.25, 0.5, 0.75])]
     drawn += [f'<path class="limit" d="M{_px(axis, limit)} 0V{HEIGHT}"/>' for limit in shown]
     drawn += [_staircase(axis, s.before, "before", s.role) for s in series]
@@ -213,7 +220,7 @@ def pairs_figure(
     ``band``: the share that a log may worsen, drawn as a line above which it fails.
     """
     both = [np.abs(x) for p in pairs for x in (p.before, p.now)]
-    axis = Axis.of(np.concatenate(both), least=least)
+    axis = Axis.of(_with_room(np.concatenate(both)), least=least)
     drawn = [_grid(axis, []), _rows_grid(axis), f'<path class="equal" d="M0 {HEIGHT}L{WIDTH} 0"/>']
     if band is not None:
         up = float(np.log1p(band) / math.log(axis.high / axis.low))
@@ -223,7 +230,7 @@ def pairs_figure(
     for p in pairs:
         drawn.append(_points(axis, p, failed=False))
         drawn.append(_points(axis, p, failed=True))
-    ticks = [(float(axis.share(x)), short(x)) for x in axis.ticks()]
+    ticks = [(float(axis.share(x)), f"{x:g}") for x in axis.ticks()]
     labels = _x_labels(axis, metric, what="baseline, ") + _y_labels(ticks)
     legend = '<ul class="legend"><li class="k-equal"><i></i>as in the baseline</li>'
     if band is not None:
@@ -287,7 +294,7 @@ def _x_labels(axis: Axis, metric: str, *, what: str = "") -> str:
     for k, x in enumerate(found):
         odd = ' class="odd"' if k % 2 else ""
         middle = k == (len(found) - 1) // 2 // 2 * 2
-        text = f"{what}{short(x)}{unit}" if middle else short(x)
+        text = f"{what}{x:g}{unit}" if middle else f"{x:g}"
         spans.append(f'<span{odd} style="left:{100.0 * float(axis.share(x)):.2f}%">{text}</span>')
     return f'<div class="ticks-x">{"".join(spans)}</div>'
 

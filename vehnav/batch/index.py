@@ -133,7 +133,9 @@ def _cards(results: Results, comparison: Comparison | None) -> list[tuple[str, s
     metric = wording.main_metric(rows)
     values = _values(rows, metric)
     if values.size:
-        for name, share in (("median log", 50), ("90 % are under", 90)):
+        more = directions(rows).get(metric) == "more"
+        tail = ("90 % are over", 10) if more else ("90 % are under", 90)
+        for name, share in (("median log", 50), tail):
             value = float(np.percentile(np.abs(values), share))
             cards.append((name, wording.with_unit(value, metric), metric, ""))
     if comparison is not None:
@@ -224,9 +226,9 @@ def _pairs(
 def _shares_table(rows: Sequence[Result], metrics: Sequence[str], item: Comparison | None) -> str:
     """Quantiles of every figure by configuration, with those of the baseline beside them."""
     sides = directions(rows)
-    head = ["figure", "configuration", "logs", "median", "90 %", "largest"]
+    head = ["figure", "configuration", "logs", "median", "worst tenth", "worst"]
     if item is not None:
-        head += ["baseline: median", "90 %", "largest"]
+        head += ["baseline: median", "worst tenth", "worst"]
     cells = []
     for metric in metrics:
         high, last = (10.0, 0.0) if sides.get(metric) == "more" else (90.0, 100.0)
