@@ -15,7 +15,8 @@ import numpy.typing as npt
 
 from vehnav.aiding.coarse import AT_ONCE, CoarseStart, coarse_start
 from vehnav.aiding.fixes import Fixes
-from vehnav.aiding.land import LandResult, Use, run_land, tuning_from_log
+from vehnav.aiding.known import with_sensor
+from vehnav.aiding.land import LandResult, Tuning, Use, run_land, tuning_from_log
 from vehnav.classic import Drive, Outcome
 from vehnav.config import Config, outage_spans
 from vehnav.earth import normal_gravity
@@ -96,7 +97,7 @@ def run_aided(
     start = coarse_start(
         drive, fixes, position=given.position, heading=given.heading, attitude=given.attitude
     )
-    tuning = tuning_from_log(drive, tactical=config.tactical)
+    tuning = _tuning(drive, config)
     result = run_land(
         drive, start, tuning,
         fixes=fixes if config.uses("gnss") or config.gps == "start" else None,
@@ -189,6 +190,22 @@ def _speed(log: Log, config: Config, origin: int) -> tuple[Array, Array] | None:
     if log.speed is None or not config.uses("odometer"):
         return None
     return np.asarray((log.speed.t_ns - origin) * NS, np.float64), log.speed.speed
+
+
+def _tuning(drive: Drive, config: Config) -> Tuning:
+    """By grade, with the noise of a sensor that is named."""
+    tuning = tuning_from_log(drive, tactical=config.tactical)
+    known = config.known_sensor
+    if known is None:
+        return tuning
+    return with_sensor(
+        tuning,
+        name=known.name,
+        gyro_noise=known.gyro.noise,
+        gyro_walk=known.gyro.drift,
+        accel_noise=known.accel.noise,
+        accel_walk=known.accel.drift,
+    )
 
 
 def _alignment(

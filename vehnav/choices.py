@@ -9,10 +9,9 @@ import numpy as np
 
 from vehnav.classic import Corrections, Drive, noise_from_rest, noise_of_sensor
 from vehnav.config import Config
-from vehnav.errors import ConfigError
+from vehnav.errors import ConfigError, Finding
 from vehnav.legs import LegNoise
 from vehnav.prepare import Samples
-from vehnav.sensors import load_sensor
 from vehnav.start import Given
 from vehnav.stops import RMS_RULE, StopRule
 from vehnav.units import DEG
@@ -38,11 +37,11 @@ def corrections_of(config: Config) -> Corrections:
 def stop_rule(config: Config) -> StopRule:
     """The rule of the options, with the defaults of its statistic."""
     rule = StopRule() if config.stop_statistic == "slow" else RMS_RULE
-    in_file = None if config.sensor is None else load_sensor(config.sensor).stop_threshold
+    known = config.known_sensor
     if config.stop_threshold is not None:
         rule = replace(rule, threshold=config.stop_threshold * DEG)
-    elif in_file is not None:
-        rule = replace(rule, threshold=in_file)
+    elif known is not None and known.stop_threshold is not None:
+        rule = replace(rule, threshold=known.stop_threshold)
     if config.stop_window is not None:
         rule = replace(rule, window=config.stop_window)
     if config.stop_dwell is not None:
@@ -70,18 +69,27 @@ def given_start(config: Config) -> Given:
 def leg_noise(drive: Drive, config: Config) -> LegNoise:
     """From the log's own rest, and from the sensor where one is named."""
     noise = noise_from_rest(drive)
-    if config.sensor is None:
+    known = config.known_sensor
+    if known is None:
         return noise
-    sensor = load_sensor(config.sensor)
-    gyro = sensor.gyro
-    wandering = gyro.bias_instability * (2.0 / gyro.bias_time) ** 0.5  # of a Gauss-Markov bias
     return noise_of_sensor(
         noise,
-        gyro_noise=gyro.noise,
-        gyro_walk=float(np.hypot(gyro.walk, wandering)),
-        accel_noise=sensor.accel.noise,
-        accel_bias=sensor.accel.bias,
+        gyro_noise=known.gyro.noise,
+        gyro_walk=known.gyro.drift,
+        accel_noise=known.accel.noise,
+        accel_bias=known.accel.bias,
     )
+
+
+def sensor_findings(config: Config) -> list[Finding]:
+    """That a named sensor's noise was taken by a stop method."""
+    if config.known_sensor is None:
+        return []
+    text = (
+        f"noise of sensor {config.known_sensor.name} ({config.sensor}) weighs the stops where it "
+        "is more than the log's own rest shows; its bias walk and accelerometer bias as they are"
+    )
+    return [Finding("sensor-noise", "info", text)]
 
 
 def check_levelling_rate(config: Config, samples: Samples) -> None:

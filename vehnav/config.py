@@ -7,10 +7,14 @@ pipeline alone unpacks it into the keyword arguments of the physics.
 from __future__ import annotations
 
 import math
-from dataclasses import asdict, dataclass
-from typing import Any, Literal
+from dataclasses import asdict, dataclass, fields
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, Literal
 
 from vehnav.errors import ConfigError
+
+if TYPE_CHECKING:
+    from vehnav.sensors import Sensor
 
 AIDS = ("zupt", "zaru", "nhc", "odometer", "gnss")
 
@@ -36,8 +40,8 @@ class Config:
     aid : tuple of str or None
         Aids of the filter, of :data:`AIDS`; None: all that the log has except ``gnss``.
     sensor : str or None
-        Name of the catalogue or TOML file: its noise weighs the stops beside the log's own rest,
-        its stop threshold counts where none is given.
+        Name of the catalogue or TOML file: its noise weighs the stops beside the log's own rest
+        and is that of the filter; its stop threshold counts where none is given.
     sensor_grade : {"auto", "mems", "tactical"}
         Noise of the filter; ``auto``: by the gyro at rest.
     azimuth : {"relative", "absolute"}
@@ -134,6 +138,19 @@ class Config:
             outage_spans(text, 0.0)
         if self.outage and self.gps != "aid":
             raise ConfigError("--outage cuts out fixes that aid; it belongs to --gps aid")
+
+    @cached_property
+    def known_sensor(self) -> Sensor | None:
+        """The sensor of ``--sensor``, read once; ConfigError where it cannot be."""
+        if self.sensor is None:
+            return None
+        from vehnav.sensors import load_sensor
+
+        return load_sensor(self.sensor)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """The fields alone go to another process; what was read from them is read there again."""
+        return {field.name: getattr(self, field.name) for field in fields(self)}
 
     @property
     def aided(self) -> bool:

@@ -22,6 +22,7 @@ from vehnav.choices import (
     corrections_of,
     given_start,
     leg_noise,
+    sensor_findings,
     stop_rule,
 )
 from vehnav.classic import (
@@ -194,7 +195,7 @@ def run(log: Log, config: Config = DEFAULTS) -> Run:
     variants = _variants(drive, start, noise, sigmas, samples, config, outcome)
     judged = {} if log.gnss is None else _judge_all(trajectory, variants, log.gnss, gps)
     errors, before = judged.pop("", None), judged.pop("before", None)
-    findings = [*log.findings, *samples.findings, *start_findings]
+    findings = [*log.findings, *samples.findings, *start_findings, *sensor_findings(config)]
     findings += stop_findings(stops, outcome.records, samples.t_ns)
     findings += polar_findings(trajectory, config)
     findings += [] if errors is None else list(errors.findings)

@@ -102,8 +102,9 @@ RUN_FIELDS = (
 )  # fmt: skip
 @option(
     "method", "--sensor", metavar="NAME|FILE",
-    help="Sensor of the catalogue (hg1700, mems-industrial, ...) or TOML file: its noise weighs "
-    "the stops.  [default: the log's own rest]",
+    help="Sensor of the catalogue (hg1700, mems-industrial, ...) or TOML file ('vehnav sensor' "
+    "writes one): its noise weighs the stops, or is that of the filter.  [default: the log's own "
+    "rest]",
 )  # fmt: skip
 @option(
     "method", "--sensor-grade", type=click.Choice(["auto", "mems", "tactical"]), default="auto",

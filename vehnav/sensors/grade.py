@@ -53,6 +53,17 @@ class Triad:
     full_scale: float = math.inf
     bandwidth: float = math.inf
 
+    @property
+    def drift(self) -> float:
+        """Random walk that the bias looks like for times short against ``bias_time``.
+
+        The rate's own walk and that of the Gauss-Markov bias, sigma sqrt(2 / T); per sqrt(s).
+
+        >>> round(Triad(bias_instability=3.0, bias_time=200.0, walk=0.4).drift, 12)
+        0.5
+        """
+        return math.hypot(self.walk, self.bias_instability * math.sqrt(2.0 / self.bias_time))
+
 
 @dataclass(frozen=True)
 class Sensor:
