@@ -309,7 +309,7 @@ def test_the_cursor_reads_shares(browser: Browser, file: Path) -> None:
     box = browser.box(".shares .plot")
     browser.point(box["x"] + 0.5 * box["width"], box["y"] + 20)
     said = browser.run("document.querySelector('.shares .readout').textContent")
-    value = float(re.search(r"under ([\d.]+)\sm", said).group(1))
+    value = float(re.fullmatch(r"of the logs are under ([\d.]+) m", said).group(1))
     told = browser.run("[...document.querySelectorAll('.shares output')].map((e) => e.textContent)")
     for config, text in zip(("default", "filter"), told, strict=True):
         found = [r.metrics.get(MAX) for r in fleet().results if r.config == config]
@@ -333,6 +333,6 @@ def test_a_point_names_its_log_and_a_click_shows_it(browser: Browser, file: Path
     browser.point(box["x"] + x * box["width"], box["y"] + (1.0 - y) * box["height"])
     said = browser.run("document.querySelector('.pairs .readout').textContent")
     assert said.startswith(f"{log}, ")
-    assert said.endswith("600 now")
+    assert said.endswith(" before, 600 m now")
     browser.run("document.querySelector('.pairs .plot').click()")
     assert {row[1] for row in shown(browser)} == {log}

@@ -164,8 +164,10 @@ def shares_figure(
     labels = _x_labels(axis, metric) + _y_labels([(q, f"{100 * q:.0f}") for q in _QUARTERS])
     title = f"{esc(metric)} <small>how many % of the logs are under it</small>"
     spoken = "; ".join(f"{s.name}: median {short(_middle(s.values))}" for s in series)
-    return _figure(key, "shares", title, _legend(series, shown), "".join(drawn), labels,
-                   f"{metric}, share of the logs. {spoken}", axis)  # fmt: skip
+    return _figure(
+        key, "shares", title, _legend(series, shown), "".join(drawn), labels,
+        spoken=f"{metric}, share of the logs. {spoken}", axis=axis, unit=unit_of(metric),
+    )  # fmt: skip
 
 
 _QUARTERS: Final = (0.0, 0.25, 0.5, 0.75, 1.0)
@@ -238,8 +240,8 @@ def pairs_figure(
     unit = esc(unit_of(metric) or "value")
     title = f"Now against the baseline <small>{unit}, a point for each log</small>"
     return _figure(
-        key, "pairs", title, legend + "</ul>", "".join(drawn), labels, f"{metric} now and before",
-        axis,
+        key, "pairs", title, f"{legend}</ul>", "".join(drawn), labels,
+        spoken=f"{metric} now and before", axis=axis, unit=unit_of(metric),
     )  # fmt: skip
 
 
@@ -259,11 +261,21 @@ def _points(axis: Axis, p: Pairs, *, failed: bool) -> str:
 
 
 def _figure(
-    key: str, kind: str, title: str, legend: str, drawn: str, labels: str, spoken: str, axis: Axis
+    key: str,
+    kind: str,
+    title: str,
+    legend: str,
+    drawn: str,
+    labels: str,
+    *,
+    spoken: str,
+    axis: Axis,
+    unit: str,
 ) -> str:
     return (
         f'<figure class="panel {kind}" id="{esc(key)}" data-low="{axis.low!r}" '
-        f'data-high="{axis.high!r}"><figcaption><h3>{title}</h3>{legend}</figcaption>'
+        f'data-high="{axis.high!r}" data-unit="{esc(unit)}">'
+        f"<figcaption><h3>{title}</h3>{legend}</figcaption>"
         f'<div class="frame"><div class="plot" role="img" aria-label="{esc(spoken)}">'
         f'<svg viewBox="0 0 {WIDTH} {HEIGHT}" preserveAspectRatio="none" aria-hidden="true">'
         f'{drawn}</svg><i class="cursor"></i></div>{labels}</div>'

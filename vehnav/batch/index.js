@@ -93,7 +93,6 @@
   for (const figure of all(".shares")) {
     const outputs = all("output", figure), cursor = figure.querySelector(".cursor");
     const readout = figure.querySelector(".readout");
-    const unit = figure.querySelector(".ticks-x").textContent.match(/\u00a0(\S*)/)?.[1] ?? "";
     const curves = all("path.now", figure).map((path) => {
       const steps = path.getAttribute("d").split("H").slice(1, -1);
       return steps.map((step) => step.split("V").map(Number));
@@ -106,7 +105,7 @@
         for (const [a, b] of steps) { if (a > x * WIDTH) break; y = b; }
         outputs[k].textContent = `${Math.round((1 - y / HEIGHT) * 100)} %`;
       });
-      readout.textContent = `of the logs are under ${short(value(figure, x))} ${unit}`;
+      readout.textContent = `of the logs are under ${short(value(figure, x))} ${figure.dataset.unit}`;
     }, () => {
       cursor.style.display = "none";
       readout.textContent = "";
@@ -139,7 +138,7 @@
       dot.style.top = `${best.y * 100}%`;
       const name = configs === undefined ? cells[logs] : `${cells[logs]}, ${cells[configs]}`;
       readout.textContent = `${name}: ${short(value(figure, best.x))} before, `
-        + `${short(value(figure, 1 - best.y))} now`;
+        + `${short(value(figure, 1 - best.y))} ${figure.dataset.unit} now`;
     }, () => { dot.style.display = "none"; readout.textContent = ""; });
     plot.append(dot);
     // A click shows the log in the table.

@@ -178,7 +178,8 @@ def _pictures(
             )
         pairs = _pairs(rows, order, metric, item) if k == 0 else []
         if pairs:
-            band = item.max_log_regression if item is not None else None
+            less = directions(rows).get(metric, "less") == "less"
+            band = item.max_log_regression if item is not None and less else None
             figures.append(
                 pairs_figure(metric, pairs, least=floor_of(metric), band=band, key="pairs")
             )
