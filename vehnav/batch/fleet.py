@@ -60,7 +60,7 @@ def fleet_answers(
         left = iter(tasks)
         sent: dict[Any, Task] = {}
         options = {"seconds": seconds, "memory": memory, "warm": list(warm), "token": token}
-        running = distributed.as_completed()
+        running = distributed.as_completed(loop=client.loop)
 
         def send() -> None:
             task = next(left, None)
@@ -72,7 +72,7 @@ def fleet_answers(
         for _ in range(max(1, IN_FLIGHT * _threads(client))):
             send()
         for future in running:
-            answer = _answer(future, client)
+            answer = _answer(future)
             task = sent.pop(future.key)
             future.release()
             send()
@@ -123,7 +123,7 @@ def _token(task: Task) -> Iterator[str]:
         path.unlink(missing_ok=True)
 
 
-def _answer(future: Any, client: Any) -> dict[str, Any]:
+def _answer(future: Any) -> dict[str, Any]:
     """What came back; errors of the cluster itself end the suite."""
     if future.status in ("cancelled", "lost"):
         raise WorkerError("the Dask cluster went away; what was done is kept, --resume goes on")
@@ -132,7 +132,11 @@ def _answer(future: Any, client: Any) -> dict[str, Any]:
         if type(error).__name__ != "KilledWorker":
             raise WorkerError(f"a worker of the cluster failed: {type(error).__name__}: {error}")
         return {"status": "crash", "error": "the workers of the cluster that tried it died"}
-    answer: dict[str, Any] = future.result()
+    return answer_of(future.result())
+
+
+def answer_of(answer: dict[str, Any]) -> dict[str, Any]:
+    """The answer of a worker; ConfigError where it is no worker for this suite."""
     if "unseen" in answer:
         raise ConfigError(
             f"the worker {answer['unseen']} of the cluster does not see {answer['folder']}: give "
