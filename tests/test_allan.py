@@ -61,7 +61,9 @@ def fitted(seed: int, stops: list[tuple[float, float]], **noise: float) -> list[
     spans = [(np.searchsorted(t, a - 1e-9), np.searchsorted(t, b - 1e-9)) for a, b in stops]
     pieces = [y[a:b] for a, b in spans]
     start, end = np.array(stops).T
-    means = PieceMeans(start, end, np.array([p.mean(axis=0) for p in pieces]), np.zeros(3))
+    means = PieceMeans(
+        start, end, np.array([p.mean(axis=0) for p in pieces]), np.zeros((len(stops), 3))
+    )
     return fit_axes(allan_curve(pieces, 1.0 / RATE), means)
 
 
@@ -195,7 +197,9 @@ def test_means_of_pieces_covary_as_the_integral_of_the_correlation():
 def test_structure_of_means():
     """Half mean squared differences, by hand; expected values and scatter by Monte Carlo."""
     start = np.array([0.0, 100.0, 250.0, 1000.0])
-    means = PieceMeans(start, start + 10.0, np.array([[1.0], [3.0], [2.0], [7.0]]), np.zeros(1))
+    means = PieceMeans(
+        start, start + 10.0, np.array([[1.0], [3.0], [2.0], [7.0]]), np.zeros((4, 1))
+    )
     found = structure(means)
     # octaves from the smallest separation: 100 and 150; 250; 750; 900 and 1000 s
     assert found.separation == pytest.approx([125.0, 250.0, 750.0, 950.0])

@@ -19,6 +19,7 @@ from vehnav.errors import ConfigError, LogError
 from vehnav.export.recording import write_recording
 from vehnav.logs.log import Imu, Log
 from vehnav.noise import RestNoise, estimate, rest_noise
+from vehnav.noise.earth import earth_rates
 from vehnav.sensors import CATALOGUE, load_sensor
 from vehnav.sensors.likeness import likeness
 from vehnav.simulate.generate import Setup, simulate_runs
@@ -172,13 +173,41 @@ def test_json_is_one_document(known, tmp_path) -> None:
 
 
 def test_the_bias_is_without_the_earth_rate() -> None:
-    """20 deg/h on z, up; latitude 51.6 deg: the Earth turns by 11.8 deg/h about it."""
-    bias = (0.0, 0.0, 20.0 * DEG_PER_HOUR)
-    noise = rest_noise(straight_log(gyro_bias=bias, noise=0.1), Config(axes="RFU"))
-    assert noise.gyro_bias[2] / DEG_PER_HOUR == pytest.approx(20.0, abs=2.0)
-    assert noise.gyro_bias_sigma[0] / DEG_PER_HOUR == pytest.approx(
-        15.041 * math.cos(0.9) / math.sqrt(2.0), rel=0.05
-    )
+    """20 deg/h on z, up, latitude 51.6 deg: the Earth turns by 11.8 deg/h about it, 9.3 north."""
+    bias = (5.0 * DEG_PER_HOUR, 0.0, 20.0 * DEG_PER_HOUR)
+    log = straight_log(gyro_bias=bias, noise=0.02)
+    noise = rest_noise(log, Config(axes="RFU"))
+    assert noise.headings == 3
+    np.testing.assert_allclose(noise.gyro_bias / DEG_PER_HOUR, [5.0, 0.0, 20.0], atol=0.6)
+    assert np.all(noise.gyro_bias_sigma / DEG_PER_HOUR < 0.6)
+    assert log.imu is not None
+    without = rest_noise(Log("no_gps.csv", log.imu), Config(axes="RFU"))
+    assert without.headings == 0
+    # anywhere on Earth, any heading: a third of the square on each axis, three rests
+    expected = 15.041 / math.sqrt(3.0) / math.sqrt(3.0)
+    assert without.gyro_bias_sigma[0] / DEG_PER_HOUR == pytest.approx(expected, rel=0.01)
+
+
+def test_headings_at_the_lights_are_the_true_ones() -> None:
+    """A city drive of a tactical sensor: its bias of 1 deg/h is found under 15 of the Earth."""
+    setup = Setup(load_sensor("hg1700"), rate_hz=50.0)
+    (made,) = simulate_runs("city,duration=500,idle=0", setup, seed=3, runs=1)
+    log = made.log()
+    noise = rest_noise(log, Config(axes="RFU"))
+    samples = noise.search.samples
+    c_gyro, _ = samples.orientation.matrices()
+    spans = [tuple(np.searchsorted(samples.t, piece)) for piece in noise.pieces]
+    spans = [(int(a), int(b) - 1) for a, b in spans]
+    found = earth_rates(log, samples, spans, c_gyro)
+    c_nb = made.truth.c_nb[[a for a, _ in spans]]
+    true = np.arctan2(c_nb[:, 0, 1], c_nb[:, 1, 1])  # of the forward axis, clockwise from north
+    known = np.isfinite(found.headings)
+    assert np.count_nonzero(known) >= len(spans) - 1
+    away = np.degrees(np.angle(np.exp(1j * (found.headings[known] - true[known]))))
+    assert np.max(np.abs(away)) < 6.0  # HEADING is 3 deg, one sigma
+    error = noise.gyro_bias - made.errors.gyro_bias
+    assert np.all(np.abs(error) < 3.0 * noise.gyro_bias_sigma)
+    assert np.all(noise.gyro_bias_sigma < 1.2 * DEG_PER_HOUR)
 
 
 def test_axes_are_the_sensors_own() -> None:

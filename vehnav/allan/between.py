@@ -31,9 +31,9 @@ class PieceMeans:
         s, ascending, not overlapping.
     mean : (p, a)
         Of a axes.
-    other : (a,)
-        Variance of a mean that is no work of the sensor and unrelated from piece to piece, such as
-        the Earth rate on an axis whose heading is not known.
+    other : (p, a)
+        Variance of each mean that is no work of the sensor and unrelated from piece to piece, such
+        as the Earth rate on an axis whose heading is not known.
     """
 
     start: Array
@@ -106,7 +106,7 @@ def structure(means: PieceMeans) -> Structure:
 
 def mean_covariance(means: PieceMeans, axis: int, powers: Powers) -> Array:
     """(p, p) covariance of the means of one axis, but for a constant common to all."""
-    known = np.eye(means.start.size) * means.other[axis]
+    known = np.diag(means.other[:, axis])
     return np.asarray(
         known + powers.weigh(lambda kind: mean_form(kind, means.start, means.end, powers.time))
     )

@@ -135,7 +135,7 @@ class _Data:
         self.y = self.curve.variance[:, axis]
         self.known = np.zeros(self.y.size)
         if means is not None and pairs is not None:
-            other = pairs.expected(np.eye(means.start.size) * means.other[axis])
+            other = pairs.expected(np.diag(means.other[:, axis]))
             self.y = np.concatenate([self.y, pairs.value[:, axis]])
             self.known = np.concatenate([self.known, other])
 

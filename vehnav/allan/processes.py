@@ -14,7 +14,7 @@ walk      random walk of the rate                                K^2, rad^2/s^3
     sigma^2(tau) = 3 Q^2/tau^2 + N^2/tau + sigma^2 G(tau/T) + K^2 tau/3
 
 (IEEE Std 952-1997, annex C), G(x) = (2/x) [1 - (3 - 4 e^-x + e^-2x) / (2 x)]. A Gauss-Markov bias
-peaks at tau = 1.89 T with 0.618 sigma; flicker noise of bias instability B has a floor of
+peaks at tau = 1.89 T with 0.617 sigma; flicker noise of bias instability B has a floor of
 sqrt(2 ln 2 / pi) B = 0.664 B; so sigma and B name the same floor to 7 %.
 """
 
@@ -119,7 +119,7 @@ def floor_of(sigma: float) -> float:
     """Largest Allan deviation of a Gauss-Markov bias of ``sigma``.
 
     >>> round(floor_of(1.0), 3)
-    0.618
+    0.617
     """
     form = allan_form("bias", np.array([PEAK]), 1.0)
     return sigma * math.sqrt(float(form[0]))

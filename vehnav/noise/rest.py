@@ -15,6 +15,7 @@ from vehnav.config import Config
 from vehnav.earth import WGS84, normal_gravity
 from vehnav.errors import Finding, LogError
 from vehnav.logs.log import Log
+from vehnav.noise.earth import earth_rates
 from vehnav.pipeline import StopSearch, search_stops
 from vehnav.units import DEG
 
@@ -28,6 +29,8 @@ SHORTEST: Final = 2.0
 """s, the shortest piece that counts."""
 NEEDED: Final = 3.0
 """s that the longest piece must have: noise from clusters of over a second."""
+TINY: Final = 1e-20
+"""(rad/s)^2, far below the variance of any mean: a dead axis has none."""
 DEFAULTS: Final = Config()
 
 
@@ -70,6 +73,8 @@ class RestNoise:
         Mean rates without the Earth's, rad/s.
     gyro_bias_sigma : (3,)
         Of that: noise, and the Earth rate on an axis whose heading is not known.
+    headings : int
+        Rests whose heading is known.
     gravity : float or None
         m/s2, where the log says where it was recorded.
     findings : tuple of Finding
@@ -83,6 +88,7 @@ class RestNoise:
     accel: Instrument
     gyro_bias: Array
     gyro_bias_sigma: Array
+    headings: int
     gravity: float | None
     findings: tuple[Finding, ...]
 
@@ -125,22 +131,23 @@ def rest_noise(log: Log, config: Config = DEFAULTS) -> RestNoise:
     gyro, accel = samples.omega @ c_gyro, samples.f @ c_accel  # back to the sensor's own axes
     start = np.array([t[a] for a, _ in spans]) - 0.5 * dt
     end = np.array([t[b] for _, b in spans]) + 0.5 * dt
-    lat, gravity = _place(log)
-    up = c_gyro.T @ np.array([0.0, 0.0, 1.0])
-    earth_up, earth_other = _earth_rate(up, lat)
+    earth = earth_rates(log, samples, spans, c_gyro)
     rates = [gyro[a : b + 1] for a, b in spans]
-    means = PieceMeans(start, end, np.array([p.mean(axis=0) for p in rates]), earth_other)
+    own = np.array([p.mean(axis=0) for p in rates]) - earth.rate
+    means = PieceMeans(start, end, own, earth.variance)
     gyros = _instrument(rates, float(dt), means)
     accels = _instrument([accel[a : b + 1] for a, b in spans], float(dt), None)
+    bias, sigma = _bias(gyros, means)
     return RestNoise(
         log,
         search,
         np.stack([start, end], axis=1),
         gyros,
         accels,
-        gyros.mean - earth_up,
-        np.asarray(np.sqrt(earth_other + _mean_variance(gyros, float(np.sum(end - start))))),
-        gravity,
+        bias,
+        sigma,
+        int(np.count_nonzero(np.isfinite(earth.headings))),
+        _gravity(log),
         (*log.findings, *samples.findings, *_dead_axes(gyros, accels)),
     )
 
@@ -200,29 +207,20 @@ def _instrument(pieces: list[Array], dt: float, means: PieceMeans | None) -> Ins
     )
 
 
-def _mean_variance(item: Instrument, total: float) -> Array:
-    """(3,) variance of the mean over ``total`` s by white noise."""
-    return np.array([(fit.white.value or 0.0) ** 2 / total for fit in item.fits])
+def _bias(item: Instrument, means: PieceMeans) -> tuple[Array, Array]:
+    """Mean (3,) of the rests weighed by what is uncertain of each, and its sigma (3,)."""
+    white = np.array([(fit.white.value or 0.0) ** 2 for fit in item.fits])
+    weight = 1.0 / (white / (means.end - means.start)[:, None] + means.other + TINY)
+    total = weight.sum(axis=0)
+    return (weight * means.mean).sum(axis=0) / total, np.asarray(1.0 / np.sqrt(total))
 
 
-def _place(log: Log) -> tuple[float | None, float | None]:
-    """Latitude, rad, and gravity, m/s2, by GPS."""
+def _gravity(log: Log) -> float | None:
+    """m/s2, by GPS."""
     if log.gnss is None or log.gnss.t_ns.size == 0:
-        return None, None
+        return None
     lat, height = float(np.median(log.gnss.lat)), float(np.median(log.gnss.height))
-    return lat, float(normal_gravity(lat, height, WGS84))
-
-
-def _earth_rate(up: Array, lat: float | None) -> tuple[Array, Array]:
-    """Earth rate on the axes (3,), and the variance (3,) of what an unknown heading leaves.
-
-    The vertical part is known where the latitude is; the level one turns with the vehicle.
-    """
-    level = 1.0 - up**2
-    rate = WGS84.omega_ie
-    if lat is None:
-        return np.zeros(3), np.asarray(rate**2 * (0.5 * level + up**2) / 2.0)
-    return up * rate * np.sin(lat), np.asarray(0.5 * level * (rate * np.cos(lat)) ** 2)
+    return float(normal_gravity(lat, height, WGS84))
 
 
 def _dead_axes(gyro: Instrument, accel: Instrument) -> list[Finding]:

@@ -151,8 +151,8 @@ def _gyro_bias(noise: RestNoise, told: dict[str, Figure], untold: dict[str, str]
         told["gyro_bias"] = Figure(root, root / math.sqrt(6.0))  # three degrees of freedom
     else:
         untold["gyro_bias"] = (
-            "smaller than its uncertainty, which is noise and, on axes whose heading is not known, "
-            "the Earth rate"
+            "smaller than its uncertainty, which is noise and, in rests whose heading is not "
+            "known, the Earth rate"
         )
 
 

@@ -113,6 +113,11 @@ def notes(noise: RestNoise) -> list[str]:
             f"{noise.gravity:.4f}: {noise.force_excess / MILLI_G:+.1f} mg as a bias along gravity, "
             f"or {100.0 * noise.force_excess / noise.gravity:+.2f} % of scale"
         )
+    if noise.gravity is not None:
+        out.append(
+            f"Earth rate taken out; the heading is known by GPS in {noise.headings} of "
+            f"{len(noise.pieces)} rests"
+        )
     if noise.gyro.between is not None:
         out.append(
             f"beyond half of the longest rest the gyro figures rest on the mean rates of the "
@@ -139,15 +144,15 @@ def _item(name: str, text: str) -> str:
 def _block(part: Part, noise: RestNoise, found: Estimate) -> list[str]:
     """Title, and a row for each figure with its axes and what they have in common."""
     item: Instrument = getattr(noise, part)
-    lines = [f"{NAMES[part]:<19}{'x':>15}{'y':>15}{'z':>15}{'all':>15}"]
+    lines = [f"{NAMES[part]:<19}{'x':>16}{'y':>16}{'z':>16}{'all':>16}"]
     for row, kind, key in zip(ROWS, KINDS, KEYS[part], strict=True):
         place = FIELDS[key]
         cells = [figure_text(getattr(fit, kind), place.factor) for fit in item.fits]
         cells.append(figure_text(found.told.get(key, Figure()), place.factor))
         lines.append(_row(row, cells, place.unit))
-    times = ["-" if fit.time is None else f"{fit.time:.0f}" for fit in item.fits]
-    if any(text != "-" for text in times):
-        lines.append(_row("  its time", [*times, ""], "s"))
+        if kind == "bias" and any(fit.time is not None for fit in item.fits):
+            times = ["-" if fit.time is None else f"{fit.time:.0f}" for fit in item.fits]
+            lines.append(_row("  its time", [*times, ""], "s"))
     if part == "gyro":
         place = FIELDS["gyro_bias"]
         cells = [
@@ -159,8 +164,13 @@ def _block(part: Part, noise: RestNoise, found: Estimate) -> list[str]:
     return lines
 
 
+def _power(value: float) -> int:
+    """Power of ten of the first digit; 0 of nothing."""
+    return math.floor(math.log10(abs(value))) if value else 0
+
+
 def _row(name: str, cells: Sequence[str], unit: str) -> str:
-    return f"  {name:<17}" + "".join(f"{cell:>15}" for cell in cells) + f"  {unit}"
+    return f"  {name:<17}" + "".join(f"{cell:>16}" for cell in cells) + f"  {unit}"
 
 
 def figure_text(figure: Figure, factor: float) -> str:
@@ -177,7 +187,7 @@ def figure_text(figure: Figure, factor: float) -> str:
             return f"{value:.4g}"
         power = math.floor(math.log10(sigma))
         lead = sigma / 10.0**power
-        digits = -power + (1 if lead < 1.95 else 0)
+        digits = min(-power + (1 if lead < 1.95 else 0), 3 - _power(value))
         shown = [round(x, digits) for x in (value, sigma)]
         return " ± ".join(f"{x:.{max(digits, 0)}f}" for x in shown)
     if figure.limit is not None:
@@ -198,7 +208,7 @@ def _likeness_lines(grades: Sequence[Likeness]) -> list[str]:
 
 
 def _times(ratio: float) -> str:
-    return f"{ratio:.2g} times" if ratio < 99.5 else f"{ratio:.0f} times"
+    return f"{ratio:.1f} times" if 0.95 <= ratio < 9.95 else f"{float(f'{ratio:.2g}'):g} times"
 
 
 # ---- the document ------------------------------------------------------------------------------
