@@ -162,7 +162,7 @@ def establish_axes(
     turned = turns(t, gyro, accel, rest, stops)
     decided = events.consistency >= FAIR and events.speed >= EVENT_SPEED
     clue = _gps_clue(t, gyro, accel, rest, stops, gps, gps_seconds, grow=not decided)
-    inverted = clue is not None and clue.parity < 0.0 and clue.mirrored
+    inverted = clue is not None and clue.parity < -PARITY and clue.mirrored
     forward, source = _forward(events, turned, clue)
     sign = -1.0 if inverted else 1.0
     if forward is None:
