@@ -212,7 +212,7 @@ def aids_of(way, drawn, *, epoch=0.1, gnss=None, zupt=False, nhc=False, speed=No
     still = count[epochs + 1] - count[before] == epochs - before + 1
     reading = np.full(epochs.size, np.nan) if speed is None else speed[epochs]
     return Aids(epochs.astype(np.int64), still, zupt, False, nhc, reading, fix, drawn.fixes,
-                np.zeros(seconds.size))  # fmt: skip
+                np.zeros(seconds.size), np.zeros((epochs.size, 6)))  # fmt: skip
 
 
 def filtered(drawn, aids, noise, *, absolute=False):

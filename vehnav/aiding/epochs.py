@@ -44,6 +44,7 @@ def predict(
     row: Array,
     rate: Vec3,
     force: tuple[float, float],
+    shaken: Array,
     dt: float,
     phi: Array,
     decay: Array,
@@ -54,7 +55,8 @@ def predict(
 ) -> None:
     """Covariance over an epoch of ``dt`` s around the state ``row``; writes Phi and decay too.
 
-    ``rate`` (rad/s) and ``force`` (right and forward, m/s2): means over the epoch, body axes.
+    ``rate`` (rad/s) and ``force`` (right and forward, m/s2): means over the epoch, body axes;
+    ``shaken`` (6,): :func:`vehnav.aiding.vibration.shaken_densities`.
     """
     f = work[:9]
     f[:, :] = 0.0
@@ -65,22 +67,21 @@ def predict(
     for a in range(9):
         f[a, GYRO_SCALE] = -rate[2] * f[a, 14]
         f[a, ACCEL_SCALE] = -force[1] * f[a, 10]
-    g = np.empty((9, 3))
-    for a in range(9):
-        for j in range(3):
-            g[a, j] = f[a, 12 + j]
+    g = f[:, 9:15].copy()
     transition_rows(f, dt, phi)
     kept = np.exp(-dt / noise.slow_time)
     decay[SIDE] = kept
     decay[LIFT] = kept
     propagate(p, phi, decay, work[:9])
     accel = noise.accel + noise.accel_share * np.hypot(force[0], force[1])
-    q = noise.gyro * noise.gyro * dt
-    for a in range(9):
-        for b in range(9):
-            p[a, b] += q * (g[a, 0] * g[b, 0] + g[a, 1] * g[b, 1] + g[a, 2] * g[b, 2])
+    for j in range(6):
+        white = accel if j < 3 else noise.gyro
+        share = noise.accel_shaken if j < 3 else noise.gyro_shaken
+        q = (white * white + share * share * shaken[(j + 3) % 6]) * dt
+        for a in range(3, 9):
+            for b in range(3, 9):
+                p[a, b] += q * g[a, j] * g[b, j]
     for j in range(3):
-        p[3 + j, 3 + j] += accel * accel * dt
         p[9 + j, 9 + j] += noise.accel_walk * noise.accel_walk * dt
         p[12 + j, 12 + j] += noise.gyro_walk * noise.gyro_walk * dt
     p[MOUNT_YAW, MOUNT_YAW] += noise.mount_walk * noise.mount_walk * dt

@@ -53,6 +53,8 @@ class Aids:
         number of the form (:mod:`vehnav.aiding.gnss_forms`).
     ago : (k,)
         s by which the fix is older than its epoch.
+    shaken : (m, 6)
+        :func:`vehnav.aiding.vibration.shaken_densities` at the epochs.
     """
 
     epochs: IntArray
@@ -64,6 +66,7 @@ class Aids:
     fix: IntArray
     fixes: Array
     ago: Array
+    shaken: Array
 
 
 @dataclass(frozen=True)
@@ -169,6 +172,7 @@ def run_epochs(
     fix: IntArray,
     fixes: Array,
     ago: Array,
+    shaken: Array,
     noise: Noise,
     absolute: bool,
     earth: Ellipsoid,
@@ -197,8 +201,8 @@ def run_epochs(
             dt = t[b] - t[a]
             force = mean_force(t, dvel, a, b)
             predict(
-                p, rows[(a + b) // 2], rate, force, dt, phi[e], decay[e], work, noise, absolute,
-                earth,
+                p, rows[(a + b) // 2], rate, force, shaken[e], dt, phi[e], decay[e], work, noise,
+                absolute, earth,
             )  # fmt: skip
             par[12] *= decay[e, 21]
             par[13] *= decay[e, 22]
@@ -267,8 +271,8 @@ def run_filter(
          np.require(increments.coast, np.bool_, ["C", "W"])),
         _ready(gaps.attitude), _ready(gaps.velocity),
         aids.epochs, aids.stopped, (aids.zupt, aids.zaru, aids.nhc), aids.speed, aids.fix,
-        aids.fixes, aids.ago, noise, absolute, earth, rows, parameters, covariance, fed_back, phi,
-        decay, kept, until, counts,
+        aids.fixes, aids.ago, aids.shaken, noise, absolute, earth, rows, parameters, covariance,
+        fed_back, phi, decay, kept, until, counts,
     )  # fmt: skip
     u = int(kept[3][0])
     return Filtered(

@@ -13,8 +13,9 @@ from vehnav.earth import Ellipsoid, c_en, ecef_from_geodetic, local_enu
 
 Array = npt.NDArray[np.float64]
 
-DEFAULT_SIGMA: Final = 2.0
-"""m per horizontal axis of a receiver that logs none; twice that for the height."""
+DEFAULT_SIGMA: Final = 1.0
+"""m per horizontal axis at 1 Hz of a receiver that logs none; twice that for the height. What is
+slower in its error than a minute or two is common to start and judge and does not count."""
 LEAST_SIGMA: Final = 0.01
 """m: stamps and swaying leave this even with a phase solution."""
 DEFAULT_VELOCITY_SIGMA: Final = 0.2
@@ -68,7 +69,10 @@ class Fixes:
     def sigmas(self) -> Array:
         """(k, 3) m: those of the log, not below :data:`LEAST_SIGMA`, else the default."""
         if self.sigma_pos is None:
-            default = np.array([1.0, 1.0, 2.0]) * DEFAULT_SIGMA
+            span = float(self.t[-1] - self.t[0]) if self.t.size > 1 else 0.0
+            crowd = max(1.0, (self.t.size - 1) / span) if span > 0.0 else 1.0
+            # fixes closer than a second share their errors
+            default = np.array([1.0, 1.0, 2.0]) * DEFAULT_SIGMA * np.sqrt(crowd)
             return np.asarray(np.broadcast_to(default, (self.t.size, 3)))
         return np.maximum(self.sigma_pos, LEAST_SIGMA)
 

@@ -22,6 +22,7 @@ from vehnav.aiding.fixes import Fixes
 from vehnav.aiding.gaps import bridge_gaps
 from vehnav.aiding.smoother import Smoothed, run_smoother
 from vehnav.aiding.vehicle import MEMS, TACTICAL, Noise, Prior
+from vehnav.aiding.vibration import shaken_densities
 from vehnav.classic import Drive, Outcome, StopRecord
 from vehnav.rest import TimeIntegral, white_noise
 from vehnav.stops import stopped_mask
@@ -196,7 +197,8 @@ def put_to_epochs(
     reading = _readings(t[epochs], speed)
     table = np.zeros((0, 13)) if inside is None else inside.table(drive.earth)
     ago = np.zeros(0) if inside is None else t[at_fix] - inside.t
-    return Aids(epochs, still, use.zupt, use.zaru, use.nhc, reading, fix, table, ago)
+    shaken = shaken_densities(drive.t, drive.omega, drive.f, t[epochs])
+    return Aids(epochs, still, use.zupt, use.zaru, use.nhc, reading, fix, table, ago, shaken)
 
 
 def _readings(t: Array, speed: tuple[Array, Array] | None) -> Array:

@@ -1,0 +1,44 @@
+"""Density of the fastest vibration: white noise, slow motion, a shaken stretch."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from vehnav.aiding.vibration import shaken_densities
+
+RATE = 100.0
+T = np.arange(0.0, 200.0, 1.0 / RATE)
+
+
+def test_white_noise_shows_its_own_density():
+    rng = np.random.default_rng(3)
+    omega, f = 0.02 * rng.normal(size=(T.size, 3)), 0.3 * rng.normal(size=(T.size, 3))
+    found = shaken_densities(T, omega, f, np.arange(1.0, 199.0))
+    assert found[:, :3].mean() == pytest.approx(0.02**2 / RATE, rel=0.03)
+    assert found[:, 3:].mean() == pytest.approx(0.3**2 / RATE, rel=0.03)
+
+
+def test_driving_is_not_vibration():
+    """A turn of 0.5 rad/s within 4 s and a bend of the force: far below half the rate."""
+    omega = np.outer(0.25 * (1.0 - np.cos(0.5 * np.pi * T)), [0.0, 0.0, 1.0])
+    f = np.outer(3.0 * np.sin(np.pi * T), [1.0, 0.0, 0.0]) + [0.0, 0.0, 9.8]
+    found = np.sqrt(shaken_densities(T, omega, f, T[::50]))
+    assert np.max(found[:, :3]) < 1e-5  # a thousandth of a deg/s/sqrt(Hz)
+    assert np.max(found[:, 3:]) < 2e-4
+
+
+def test_a_shaken_stretch_is_seen_where_it_is_and_on_its_axis():
+    rng = np.random.default_rng(4)
+    omega = 1e-4 * rng.normal(size=(T.size, 3))
+    shaken = (T > 80.0) & (T < 120.0)
+    omega[shaken, 0] += 0.2 * rng.normal(size=int(shaken.sum()))
+    found = shaken_densities(T, omega, np.zeros_like(omega), np.array([40.0, 100.0, 160.0]))
+    assert found[1, 0] > 1e5 * found[0, 0]
+    assert found[1, 0] > 1e5 * found[2, 0]
+    assert found[1, 0] > 1e5 * found[1, 1]
+
+
+def test_few_samples_show_nothing():
+    nothing = np.zeros((3, 3))
+    assert not np.any(shaken_densities(T[:3], nothing, nothing, T[:2]))
