@@ -17,7 +17,7 @@ from vehnav.choices import METHODS
 from vehnav.cli.main import cli
 from vehnav.earth import KRASOVSKY
 from vehnav.errors import ConfigError
-from vehnav.papers import PAPERS, claims, paper000, paper002, paper004, run_papers
+from vehnav.papers import PAPERS, claims, paper000, paper001, paper002, paper004, run_papers
 from vehnav.papers.claims import Row
 from vehnav.papers.rerun import markdown
 from vehnav.strapdown.eci import EciForm
@@ -206,10 +206,34 @@ def test_30_drive_of_paper_002():
 # ---- the command -------------------------------------------------------------------------------
 
 
-def test_papers_that_wait_say_for_what():
-    rows = run_papers(["001"])
-    assert {row.verdict for row in rows} == {"waits"}
-    assert all("needs" in row.why for row in rows)
+def test_claims_that_wait_say_for_what():
+    row = claims.waiting("001", "k", "a claim", "the error budget")
+    assert row.verdict == "waits"
+    assert row.why.startswith("needs the error budget")
+
+
+@pytest.mark.slow
+def test_paper_001_is_reproduced():
+    rows = by_key(paper001.rows(fast=True))
+    assert {row.verdict for row in rows.values()} == {"reproduced"}
+    assert rows["forward"].values["ratio"] == pytest.approx(1.0, abs=0.15)
+
+
+@pytest.mark.slow
+def test_paper_001_sees_a_wrong_model(monkeypatch):
+    """Another sensor drawn than the linear equations are told of."""
+    from vehnav.budget.study import Study
+    from vehnav.sensors import CATALOGUE
+
+    drawn = Study.monte_carlo
+    monkeypatch.setattr(
+        Study,
+        "monte_carlo",
+        lambda self, _, initial, **more: drawn(self, CATALOGUE["mems-industrial"], initial, **more),
+    )
+    rows = by_key(paper001.rows(fast=True))
+    for key in ("forward", "forward-stops", "inverse"):
+        assert rows[key].verdict == "not reproduced"
 
 
 def test_unknown_paper():
@@ -224,7 +248,9 @@ def test_markdown_escapes_and_keeps_every_cell():
     assert lines[0].count("|") == lines[1].count("|") == 7
 
 
-def test_command_prints_text_markdown_and_json():
+def test_command_prints_text_markdown_and_json(monkeypatch):
+    two = [claims.waiting("001", key, "a claim", "more") for key in ("a", "b")]
+    monkeypatch.setattr(paper001, "rows", lambda fast: two)
     runner = CliRunner()
     text = runner.invoke(cli, ["papers", "001"])
     assert text.exit_code == 0

@@ -155,6 +155,12 @@ class Budget:
         trace = np.trace(self.covariance[:until, PSI, PSI], axis1=1, axis2=2)
         return Validity(float(np.sqrt(trace.max())))
 
+    def valid_until(self) -> float:
+        """S: the last instant up to which the linear equations are not invalid."""
+        psi = np.sqrt(np.trace(self.covariance[:, PSI, PSI], axis1=1, axis2=2))
+        beyond = np.flatnonzero(psi > INVALID)
+        return float(self.t[max(int(beyond[0]) - 1, 0)] if beyond.size else self.t[-1])
+
     def rows(self, time: float) -> list[Row]:
         """Sources at a time, the largest first; those of no size are left out."""
         k = self.sensitivity.index(time)

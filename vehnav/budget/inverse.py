@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
@@ -252,7 +252,7 @@ def _finished(
 def with_parameter(sensor: Sensor, parameter: str, value: float) -> Sensor:
     """The sensor with another value (SI) of a key of a sensor file."""
     place = FIELDS[parameter]
-    if place.part == "sensor":
-        return replace(sensor, **{place.attribute: value})
-    triad = replace(getattr(sensor, place.part), **{place.attribute: value})
-    return replace(sensor, **{place.part: triad})
+    changed: dict[str, Any] = {place.attribute: value}
+    if place.part != "sensor":
+        changed = {place.part: replace(getattr(sensor, place.part), **changed)}
+    return replace(sensor, **changed)

@@ -18,6 +18,7 @@ from vehnav.noise import Estimate, RestNoise
 from vehnav.noise.sensor import KEYS, WORDS, Part
 from vehnav.report.markup import esc, table
 from vehnav.report.page import page, section
+from vehnav.report.scale import log_ticks
 from vehnav.report.sensor_text import KINDS, NAMES, figure_text, notes
 from vehnav.sensors import FIELDS
 from vehnav.units import DEG_PER_HOUR, MILLI_G
@@ -106,7 +107,7 @@ def picture(noise: RestNoise, part: Part) -> LogLog:
     spread = 1.0 / np.sqrt(2.0 * np.maximum(curve.dof[sure], 1.0))
     lines = []
     for k, fit in enumerate(item.fits):
-        if fit.white.value is None:
+        if fit.dead:
             continue
         value = curve.deviation[sure, k] / factor
         fit_tau, fitted = _fitted(fit, float(curve.tau[sure][-1]))
@@ -169,32 +170,20 @@ def _place(item: LogLog, x: Array | float, y: Array | float) -> tuple[Array, Arr
 def _ticks(item: LogLog) -> list[str]:
     left, top, right, bottom = BOX
     out = []
-    for value, labelled in _log_ticks(item.x):
+    for value, labelled in log_ticks(*item.x):
         x = float(_place(item, value, 1.0)[0])
         style = "grid" if labelled else "fine"
         out.append(f'<path class="{style}" d="M{x:.1f} {top}V{bottom}"/>')
         if labelled:
             text = f'<text x="{x:.1f}" y="{bottom + 15}" text-anchor="middle">{value:g}</text>'
             out.append(text)
-    for value, labelled in _log_ticks(item.y):
+    for value, labelled in log_ticks(*item.y):
         y = float(_place(item, 1.0, value)[1])
         style = "grid" if labelled else "fine"
         out.append(f'<path class="{style}" d="M{left} {y:.1f}H{right}"/>')
         if labelled:
             text = f'<text x="{left - 6}" y="{y + 4:.1f}" text-anchor="end">{value:g}</text>'
             out.append(text)
-    return out
-
-
-def _log_ticks(span: tuple[float, float]) -> list[tuple[float, bool]]:
-    """Ticks 1 to 9 of every decade; labelled: the decades, or 1, 2, 5 where there are few."""
-    marked = (1,) if span[1] - span[0] > 2.2 else (1, 2, 5)
-    out = []
-    for decade in range(math.floor(span[0]), math.ceil(span[1]) + 1):
-        for digit in range(1, 10):
-            value = float(f"{digit}e{decade}")
-            if span[0] - 1e-9 <= math.log10(value) <= span[1] + 1e-9:
-                out.append((value, digit in marked))
     return out
 
 

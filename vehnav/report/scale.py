@@ -38,6 +38,24 @@ def ticks(low: float, high: float, count: int) -> list[float]:
     return [float(f"{k * step:.12g}") for k in range(first, last + 1)]
 
 
+def log_ticks(low: float, high: float) -> list[tuple[float, bool]]:
+    """Ticks 1 to 9 of every decade between powers of ten ``low`` and ``high``; whether labelled.
+
+    Labelled are the decades, or 1, 2 and 5 where there are few.
+
+    >>> [value for value, labelled in log_ticks(0.0, 1.0) if labelled]
+    [1.0, 2.0, 5.0, 10.0]
+    """
+    marked = (1,) if high - low > 2.2 else (1, 2, 5)
+    out = []
+    for decade in range(math.floor(low), math.ceil(high) + 1):
+        for digit in range(1, 10):
+            value = float(f"{digit}e{decade}")
+            if low - 1e-9 <= math.log10(value) <= high + 1e-9:
+                out.append((value, digit in marked))
+    return out
+
+
 def number(value: float, step: float = 0.0) -> str:
     """A number with the decimals that ``step`` needs and a true minus sign.
 
