@@ -87,8 +87,15 @@ def run_aided(
     origin = log.start_ns
     gnss = log.gnss if config.gps != "none" and log.gnss is not None else None
     cut = outage_intervals(config, origin, int(t_ns[-1])) if config.gps == "aid" else ()
-    fixes, until = (None, None) if gnss is None else _usable(gnss, drive, config, origin, cut)
-    drive, vetoed = _veto_stops(drive, fixes)
+    fixes, until = None, None
+    vetoed: list[Finding] = []
+    if gnss is not None:
+        # even motion from the first sample on is no stop, and GPS does not wait for its end
+        early, _ = _usable(gnss, replace(drive, stops=[]), config, origin, cut)
+        drive, vetoed = _veto_stops(drive, early)
+        fixes, until = _usable(gnss, drive, config, origin, cut)
+        drive, more = _veto_stops(drive, fixes)
+        vetoed += more
     if fixes is None and not drive.stops and given.attitude is None:
         raise LogError(
             f"{log.path}: no stop was found and no GPS may be used, so nothing says how the "

@@ -19,6 +19,9 @@ from vehnav.export.columns import QUASI, velocity_of
 from vehnav.export.formats import read_trajectory, write_trajectory
 from vehnav.export.load import as_gnss, load_track
 from vehnav.pipeline import run
+from vehnav.report.mapping import map_of
+from vehnav.report.panels import heading_panel, velocity_panel
+from vehnav.report.sections import gps_sentence, headline
 from vehnav.rotation import c_from_rotvec
 from vehnav.simulate import simulate
 from vehnav.trajectory import interpolate
@@ -156,6 +159,56 @@ def test_quasi_heading_hardly_turns_over_the_pole(crossing, tmp_path):
     r = ecef(found.trajectory)
     assert np.allclose(np.sin(np.radians(table["qlat_deg"])), -r[:, 0] / np.linalg.norm(r, axis=1))
     assert np.allclose(np.tan(np.radians(table["qlon_deg"])), r[:, 1] / r[:, 2], atol=1e-12)
+
+
+# ---- the report ----------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def aided(crossing):
+    return run(crossing.log(), Config(method="smooth", gps="aid", outage=("90:150",)))
+
+
+def test_even_motion_from_the_start_is_no_stop_that_gps_waits_for(crossing):
+    found = run(crossing.log(), Config(method="filter"))
+    assert "stop-vetoed" in {f.code for f in found.findings}
+    assert found.gps.until_ns - found.start_ns == pytest.approx(60e9, rel=0.01)
+    assert found.errors is not None
+
+
+def test_report_says_that_gps_aids(crossing, aided):
+    assert headline(aided).startswith("At most ")
+    assert "1 outage of up to 60 s" in headline(aided)
+    assert gps_sentence(aided).startswith("GPS aids all the way")
+    start = run(crossing.log(), Config(method="filter"))
+    assert "without it" in headline(start)
+    assert gps_sentence(start).startswith("GPS aided up to 60")
+
+
+def test_pole_is_marked_on_the_map_where_the_track_passes_it(aided):
+    item = map_of(aided)
+    ours = next(track for track in item.tracks if track.role == "ours")
+    ((_, place),) = ours.parts
+    turned_back = np.diff(place[:, 1]).min()
+    assert turned_back > 0.0  # the way is straight: no reflection at the pole
+    closest = np.min(np.abs(place[:, 0] - item.pole.east))
+    assert closest < 20.0
+    assert item.pole.north == pytest.approx(3600.0, abs=20.0)  # half of 240 s at 30 m/s
+    assert item.pole.text.startswith("North pole, passed at ")
+
+
+def test_plots_do_not_turn_round_at_the_pole(aided):
+    for panel in (velocity_panel(aided, 0), velocity_panel(aided, 1), heading_panel(aided)):
+        assert "a pole is near" in panel.note
+        for item in panel.curves:
+            y = np.concatenate([y for _, y in item.parts])
+            assert np.ptp(y) < 12.0, (panel.title, item.name)  # m/s or deg: noise of GPS
+
+
+def test_no_pole_on_other_maps(city):
+    found = run(city.log())
+    assert map_of(found).pole is None
+    assert "pole" not in velocity_panel(found, 0).note
 
 
 # ---- judging -----------------------------------------------------------------------------------

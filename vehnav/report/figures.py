@@ -14,16 +14,21 @@ import numpy as np
 import numpy.typing as npt
 
 from vehnav.choices import METHODS, corrections_of
+from vehnav.earth import POLAR
 from vehnav.evaluation.reference import (
     COURSE_WINDOW,
     mean_motion,
     seconds,
     tracks,
     trusted_velocity,
+    turned,
+    turning,
 )
 from vehnav.logs.log import Gnss
 from vehnav.pipeline import Run
 from vehnav.report.scale import between_gaps, envelope
+from vehnav.strapdown.quasi import wander_along
+from vehnav.trajectory import Trajectory
 from vehnav.units import NS
 
 Array = npt.NDArray[np.float64]
@@ -188,7 +193,17 @@ def gps_velocity(gnss: Gnss) -> Array:
     velocity = trusted_velocity(gnss)
     if velocity is not None:
         return velocity[:, :2]
-    return mean_motion(seconds(gnss), tracks(gnss), COURSE_WINDOW)
+    return turned(mean_motion(seconds(gnss), tracks(gnss), COURSE_WINDOW), turning(gnss))
+
+
+def near_pole(run: Run) -> bool:
+    """Whether east and north turn so fast on the way that plots are drawn in free axes."""
+    return bool(np.any(np.abs(run.trajectory.lat) > POLAR))
+
+
+def turning_of(track: Trajectory) -> Array:
+    """(n,) rad: wander angle of free axes carried along a track, as :func:`turning` of fixes."""
+    return wander_along((track.t_ns - track.t_ns[0]) * NS, track.lat, track.lon)
 
 
 def inside(run: Run, gnss: Gnss) -> npt.NDArray[np.bool_]:

@@ -9,17 +9,22 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from vehnav.earth import local_enu
+from vehnav.earth import WGS84, local_enu
 from vehnav.export.thinning import keep_points, thin
 from vehnav.pipeline import Run
 from vehnav.report.circle import ELLIPSE_95
 from vehnav.report.figures import LEGEND, gps_window, inside, log_seconds, others, own_name
 from vehnav.report.scale import between_gaps
+from vehnav.report.summary import metres
 from vehnav.trajectory import Trajectory, interpolate
 from vehnav.units import NS
 
 Array = npt.NDArray[np.float64]
 Box = tuple[float, float, float, float]
+POLE_NOTE: Final = (
+    "The map is the plane that touches the Earth at the start; up is north there, and at the pole "
+    "(ring) every way leads away from it."
+)
 
 GPS_TOLERANCE: Final = 0.2
 """m: as for the tracks of the exports."""
@@ -79,6 +84,7 @@ class Map:
     ``too_large``: how many ellipses are larger than the map. ``scale_side``: the lower corner,
     ``left`` or ``right``, that the tracks leave free for the scale bar. ``equal``: no track is the
     vehicle's own, the cursor shows all of them. ``note``: stands under the map.
+    ``pole``: where a geographic pole lies, if it is on the map.
     """
 
     box: Box
@@ -94,6 +100,7 @@ class Map:
     scale_side: str
     equal: bool = False
     note: str = ""
+    pole: Place | None = None
 
 
 def map_of(run: Run) -> Map:
@@ -110,6 +117,7 @@ def map_of(run: Run) -> Map:
     seen = [p for track in tracks if track.role in ("ours", "gps") for _, p in track.parts]
     box = box_around(np.concatenate(seen), ellipses)
     width = box[2] - box[0]
+    pole = None if run.alignment.local else _pole(run, origin, box)
     drawn = [e for e in ellipses if SMALL * width < max(e.a_east, e.a_north) < LARGE * width]
     return Map(
         box=box,
@@ -123,7 +131,23 @@ def map_of(run: Run) -> Map:
         local=run.alignment.local,
         north_known=run.alignment.heading_from != "none",
         scale_side=free_side(np.concatenate(seen), box),
+        note="" if pole is None else POLE_NOTE,
+        pole=pole,
     )
+
+
+def _pole(run: Run, origin: tuple[float, float, float], box: Box) -> Place | None:
+    """The pole of the start's hemisphere, if it lies on the map."""
+    sign = 1.0 if origin[0] > 0.0 else -1.0
+    east, north, up = (float(x) for x in local_enu(sign * np.pi / 2, 0.0, 0.0, origin=origin))
+    if up < -0.1 * WGS84.a or not (box[0] < east < box[2] and box[1] < north < box[3]):
+        return None
+    near = run.trajectory.enu(origin)[:, :2] - [east, north]
+    k = int(np.argmin(np.hypot(near[:, 0], near[:, 1])))
+    away = float(np.hypot(near[k, 0], near[k, 1]))
+    t = float(log_seconds(run, run.trajectory.t_ns[[k]])[0])
+    name = "North pole" if sign > 0.0 else "South pole"
+    return Place("pole", f"{name}, passed at {metres(away)} at {t:.1f} s", east, north, t)
 
 
 def _own(run: Run, origin: tuple[float, float, float]) -> Track:

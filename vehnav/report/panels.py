@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from vehnav.evaluation import Errors
-from vehnav.evaluation.reference import course
+from vehnav.evaluation.reference import course, turned, turning
 from vehnav.pipeline import Run
 from vehnav.report.circle import radius_95
 from vehnav.report.figures import (
@@ -22,13 +22,16 @@ from vehnav.report.figures import (
     gps_velocity,
     inside,
     log_seconds,
+    near_pole,
     others,
     own_name,
     spans,
     time_range,
+    turning_of,
 )
 from vehnav.report.scale import envelope, number
 from vehnav.rotation import angles_from_c_nb
+from vehnav.trajectory import Trajectory
 from vehnav.units import DEG
 
 Array = npt.NDArray[np.float64]
@@ -39,6 +42,7 @@ EXPECTED: Final = 6.0
 """Times the own error that the expected one may stretch it."""
 COURSE_FROM: Final = 2.0
 """m/s from which the course of GPS is shown: Doppler noise of 0.1 m/s is 3 degrees of it."""
+FREE_AXES: Final = "east and north as at the start, carried along without turning: a pole is near"
 PARTS: Final = 5
 """Of the axis of the headings, between ticks."""
 
@@ -182,20 +186,32 @@ def velocity_panel(run: Run, axis: int) -> Panel:
     if run.log.gnss is not None and north_known:
         within = inside(run, run.log.gnss)
         t = log_seconds(run, run.log.gnss.t_ns[within])
-        curves.append(curve("GPS", "gps", t, gps_velocity(run.log.gnss)[within, axis]))
+        gps = turned(gps_velocity(run.log.gnss), -turning(run.log.gnss))
+        curves.append(curve("GPS", "gps", t, gps[within, axis]))
     for name, role in others(run, ("free", "as_published")):
         other = run.variants[name]
-        curves.append(curve(LEGEND[name], role, log_seconds(run, other.t_ns), other.v_n[:, axis]))
-    curves.append(curve(own_name(run), "ours", log_seconds(run, track.t_ns), track.v_n[:, axis]))
+        curves.append(
+            curve(LEGEND[name], role, log_seconds(run, other.t_ns), _level(run, other)[:, axis])
+        )
+    own = _level(run, track)[:, axis]
+    curves.append(curve(own_name(run), "ours", log_seconds(run, track.t_ns), own))
     y_range = _readable_range([c for c in curves if c.role in ("gps", "ours")])
     name = ("East", "North")[axis]
     note = off_picture(curves, y_range, "m/s", "s")
     if not north_known:
         note = "north is not known: the first heading stands for it; " + note
+    if near_pole(run):
+        note = f"{FREE_AXES}; {note}"
     return Panel(
         f"{name.lower()}-velocity", f"{name} velocity", "m/s", "s", time_range(run), y_range,
         tuple(curves), (), spans(run), note.rstrip("; "),
     )  # fmt: skip
+
+
+def _level(run: Run, track: Trajectory) -> Array:
+    """(n, 2) m/s: east and north, in free axes where a pole is near."""
+    v = track.v_n[:, :2]
+    return turned(v, -turning_of(track)) if near_pole(run) else v
 
 
 def _readable_range(curves: list[Curve]) -> tuple[float, float]:
@@ -229,7 +245,9 @@ def heading_panel(run: Run) -> Panel:
     """Heading, with the course of GPS where it drives."""
     track = run.trajectory
     t = log_seconds(run, track.t_ns)
-    own = np.unwrap(angles_from_c_nb(track.c_nb)[0]) / DEG
+    polar = near_pole(run)
+    own = angles_from_c_nb(track.c_nb)[0] + (turning_of(track) if polar else 0.0)
+    own = np.unwrap(own) / DEG
     own -= 360.0 * np.floor(own[0] / 360.0)
     curves = []
     gnss = run.log.gnss
@@ -238,11 +256,14 @@ def heading_panel(run: Run) -> Panel:
         if fast.any():
             at = log_seconds(run, gnss.t_ns[fast])
             near = np.interp(at, t, own)
-            way = near + np.remainder(course(gnss)[fast] / DEG - near + 180.0, 360.0) - 180.0
+            way = (course(gnss) + turning(gnss))[fast] / DEG
+            way = near + np.remainder(way - near + 180.0, 360.0) - 180.0
             curves.append(curve("course by GPS", "gps", at, way))
     curves.append(curve(own_name(run), "ours", t, own))
     low, high = _readable_range(curves)
     turns = "360° is one full turn" if high - low > 400.0 else ""
+    if polar:
+        turns = "; ".join(text for text in (FREE_AXES, turns) if text)
     return Panel(
         "heading", "Heading", "°", "s", time_range(run), (low, high), tuple(curves), (),
         spans(run), turns, y_step=90.0 * max(1.0, np.ceil((high - low) / 90.0 / PARTS)),

@@ -233,6 +233,8 @@ def _draw_map(axes: Axes, item: Map) -> None:
         axes.plot(stop.east, stop.north, "o", ms=4.5, mfc="white", mec="#1c2128", mew=0.9)
     for end, colour, mark in zip(item.ends, ("#0d8a63", "#c1121f"), "os", strict=True):
         axes.plot(end.east, end.north, mark, ms=5.5, color=colour, label=end.label)
+    if item.pole is not None:
+        axes.plot(item.pole.east, item.pole.north, "o", ms=9.0, mfc="none", mec="#1c2128", mew=0.9)
     axes.set(xlim=(west, east), ylim=(south, north), aspect="equal", xticks=[], yticks=[])
     _scale_and_north(axes, item)
     _legend(axes)

@@ -29,7 +29,7 @@ SWITCHES: Final = {"levelling": "--no-levelling", "reset": "--no-reset"}
 def headline(run: Run) -> str:
     """The answer in one sentence."""
     if run.errors is not None:
-        return judged_sentence(run.errors)
+        return judged_sentence(run.errors, aided=gps_aids(run))
     if run.errors_before is not None:
         before = run.errors_before.horizontal
         driven = float(run.errors_before.distance[-1] - run.errors_before.distance[0])
@@ -51,14 +51,24 @@ def unbroken(text: str) -> str:
     return re.sub(r"(?<=\d) (?=k?m\b|%|s\b)", "\u00a0", text)
 
 
-def judged_sentence(errors: Errors) -> str:
-    """How far off at the end and at most."""
+def gps_aids(run: Run) -> bool:
+    """Whether GPS was used all the way, not for the start alone."""
+    return bool(run.gps.used_for) and run.gps.until_ns is None
+
+
+def judged_sentence(errors: Errors, *, aided: bool = False) -> str:
+    """How far off at the end and at most; of an aided run, in the outages that it had."""
+    gaps = [o for o in errors.outages if o.max_m is not None]
+    if aided and gaps:
+        worst = max(o.max_m or 0.0 for o in gaps)
+        longest = max(o.length_s for o in gaps)
+        many = "1 outage" if len(gaps) == 1 else f"{len(gaps)} outages"
+        return f"At most {metres(worst)} from GPS in {many} of up to {longest:.0f} s"
     percent = errors.percent_of_distance()["end"]
     share = "" if percent is None else f" ({percent:.1f} %)"
     end, most = float(errors.horizontal[-1]), float(errors.horizontal.max())
-    text = (
-        f"Ended {metres(end)}{share} from GPS after {metres(float(errors.distance[-1]))} without it"
-    )
+    driven = metres(float(errors.distance[-1]))
+    text = f"Ended {metres(end)}{share} from GPS after {driven} with{'' if aided else 'out'} it"
     return text if most <= 1.005 * end else f"{text}; at most {metres(most)} on the way"
 
 
@@ -67,10 +77,18 @@ def gps_sentence(run: Run) -> str:
     use = run.gps
     if run.log.gnss is None:
         return "The log has no GPS."
+    if gps_aids(run):
+        judged = "" if run.errors is None else f"; {run.errors.t_ns.size} fixes judge"
+        return f"GPS aids all the way: {use.fixes_used} fixes, none inside an outage{judged}."
     if not use.used_for or use.until_ns is None:
         judges = run.errors is not None or run.errors_before is not None
         return "GPS was not used for the solution" + ("; it only judges." if judges else ".")
     until = (use.until_ns - run.start_ns) * 1e-9
+    if "aiding" in use.used_for:
+        return (
+            f"GPS aided up to {until:.1f} s and not after: {use.fixes_used} fixes, which judge "
+            "nothing."
+        )
     window = ""
     if use.window_s is not None and use.window_path_m is not None:
         window = (

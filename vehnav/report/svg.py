@@ -258,6 +258,7 @@ def _marks(item: Map, share: float = 0.035) -> list[str]:
         text = "\n".join([stop.text, *(e.text for e in covered)])
         kind = " ".join(["stop", *(f"at-{e.label}" for e in covered)])
         out.append(_mark(item, replace(stop, text=text), kind))
+    ends += [] if item.pole is None else [item.pole]
     return [*out, *(_mark(item, place, place.label) for place in ends)]
 
 
