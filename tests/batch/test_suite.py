@@ -120,6 +120,13 @@ def test_all_of_it(folder) -> None:
     assert "errors.horizontal_m.max" in suite.metrics
 
 
+def test_a_log_may_run_with_some_configurations_only(folder) -> None:
+    text = LOG + "configs = ['b', 'the a']\n[[log]]\npath = 'drives/b.csv'\n"
+    suite = load(folder, text + "".join(f"[[config]]\nname = '{x}'\n" for x in ("the a", "b", "c")))
+    pairs = [(log.name, config.name) for log, config in suite.matrix()]
+    assert pairs == [("a", "the_a"), ("b", "the_a"), ("a", "b"), ("b", "b"), ("b", "c")]
+
+
 def test_one_configuration_is_there_by_itself(folder) -> None:
     suite = load(folder, '[suite]\nname = "s"\n[[log]]\npath = "drives/a.csv"\n')
     assert [(config.name, dict(config.options)) for config in suite.configs] == [("default", {})]
@@ -159,6 +166,8 @@ LOG = HEAD + '[[log]]\npath = "drives/a.csv"\n'
         (HEAD + "[[log]]\nscenario='city'\nsensor='hg17'", "hg1700"),
         (HEAD + "[[log]]\nscenario='city'\nrte=50", "unknown key 'rte'; did you mean 'rate'"),
         (HEAD + "[[log]]\nscenario='city'\nruns=0", "runs must be at least 1"),
+        (LOG + "configs = ['defalt']", "no configuration 'defalt'; did you mean 'default'"),
+        (LOG + "configs = 3", "configs: expected an array of texts"),
         (LOG + "[[config]]\nmethod='free'", r"\[\[config\]\] 1: no name"),
         (LOG + "[[config]]\nname='x'\nmethod='fre'", "method: expected one of stops, free"),
         (LOG + "[[config]]\nname='x'\nmethd='free'", "unknown key 'methd'; did you mean 'method'"),

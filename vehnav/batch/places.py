@@ -46,6 +46,14 @@ def expanded(text: str) -> str:
     return re.sub(r"\$\{(\w+)(?::-([^}]*))?\}", value, text)
 
 
+def beside(name: str, folder: Path) -> str:
+    """A file named in the suite, relative to it; any other name as it is."""
+    path, comma, rest = expanded(name).partition(",")
+    if Path(path).suffix.lower() not in (".toml", ".gpx", ".geojson", ".json", ".csv"):
+        return name
+    return f"{folder / path}{comma}{rest}"
+
+
 def folder_name(name: str) -> str:
     """A name that every file system takes.
 

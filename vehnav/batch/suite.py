@@ -8,6 +8,7 @@
     [[log]]
     path = "drives/*.mcap"    # a file, folder, pattern or URL; relative to the suite file
     group = "city"            # also: name, optional, and the options of `vehnav run`
+    configs = ["published"]   # without it: all
 
     [[log]]
     scenario = "city"         # simulated: the options of `vehnav simulate`
@@ -38,10 +39,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final, Literal
 
-from vehnav.batch.fields import check_keys, fraction_of, hints, size_of, value_of
+from vehnav.batch.fields import check_keys, fraction_of, hints, nearest, size_of, value_of
 from vehnav.batch.model import METRICS, Bound
 from vehnav.batch.options import check_options, config_options, run_options
-from vehnav.batch.places import Place, expanded, find_places, folder_name
+from vehnav.batch.places import beside, expanded, find_places, folder_name
 from vehnav.batch.simulation import Simulation
 from vehnav.errors import ConfigError
 
@@ -64,6 +65,8 @@ class LogSpec:
     simulation : Simulation or None
     options : mapping
         Options of ``vehnav run`` for this log.
+    configs : tuple of str or None
+        Configurations that the log runs with; None: all.
     """
 
     name: str
@@ -72,6 +75,11 @@ class LogSpec:
     shown: str
     simulation: Simulation | None = None
     options: Mapping[str, Any] = field(default_factory=dict)
+    configs: tuple[str, ...] | None = None
+
+    def runs_with(self, config: str) -> bool:
+        """Whether the log runs with this configuration."""
+        return self.configs is None or config in self.configs
 
 
 @dataclass(frozen=True)
@@ -122,11 +130,8 @@ class Suite:
 
     Attributes
     ----------
-    name : str
-    path : Path
-    logs : tuple of LogSpec
-    configs : tuple of ConfigSpec
-    bars : tuple of Bar
+    name, path : str, Path
+    logs, configs, bars : tuples of LogSpec, ConfigSpec, Bar
     baseline : BaselineSpec
     time_limit : float or None
         s for each log and configuration.
@@ -153,6 +158,12 @@ class Suite:
     def metrics(self) -> tuple[str, ...]:
         """Kept for every log: the usual ones and those of the bars."""
         return tuple(sorted({*METRICS, *(bar.metric for bar in self.bars)}))
+
+    def matrix(self) -> list[tuple[LogSpec, ConfigSpec]]:
+        """Every log with every configuration of it: the first configuration first."""
+        return [
+            (x, config) for config in self.configs for x in self.logs if x.runs_with(config.name)
+        ]
 
 
 def load_suite(path: str | Path) -> Suite:
@@ -182,7 +193,7 @@ def load_suite(path: str | Path) -> Suite:
     configs = [
         _config(table, where, path.parent) for where, table in _rows(content, "config", path)
     ]
-    _check_names(logs, configs, path)
+    _check_names(logs, configs or [ConfigSpec("default")], path)
     bars = [_bar(table, where) for where, table in _rows(content, "bar", path)]
     if "log" not in content:
         raise ConfigError(f"{path}: no [[log]]: a suite needs at least one")
@@ -201,7 +212,7 @@ def load_suite(path: str | Path) -> Suite:
 
 def _check_bars(suite: Suite) -> None:
     """ConfigError for a bar that is for no log and configuration of the suite."""
-    pairs = [(log.group, log.name, config.name) for log in suite.logs for config in suite.configs]
+    pairs = [(log.group, log.name, config.name) for log, config in suite.matrix()]
     for bar in suite.bars:
         if not any(bar.applies(*pair) for pair in pairs) and not suite.skipped:
             scope = {"group": bar.group, "log": bar.log, "config": bar.config}
@@ -253,11 +264,13 @@ def _logs(table: Mapping[str, Any], where: str, folder: Path) -> tuple[list[LogS
     if ("path" in table) == ("scenario" in table):
         raise ConfigError(f"{where}: expected either path or scenario")
     group = value_of(table.get("group", ""), str, f"{where} group")
+    configs = value_of(table.get("configs", []), tuple[str, ...], f"{where} configs")
+    configs = tuple(folder_name(name) for name in configs) or None
     if "scenario" in table:
-        return _simulated(table, where, group, folder), []
-    known = ("path", "name", "group", "optional", *run_options())
-    check_keys(table, known, where)
-    options = check_options(table, where, folder, leave=("path", "name", "group", "optional"))
+        return _simulated(table, where, group, configs, folder), []
+    known = ("path", "name", "group", "configs", "optional")
+    check_keys(table, (*known, *run_options()), where)
+    options = check_options(table, where, folder, leave=known)
     optional = value_of(table.get("optional", False), bool, f"{where} optional")
     pattern = value_of(table["path"], str, f"{where} path")
     places = find_places(pattern, folder, where, optional=optional)
@@ -266,23 +279,36 @@ def _logs(table: Mapping[str, Any], where: str, folder: Path) -> tuple[list[LogS
     name = value_of(table["name"], str, f"{where} name") if "name" in table else None
     if name is not None and len(places) > 1:
         raise ConfigError(f"{where} name: {len(places)} logs match the pattern, a name is for one")
-    return [_log(place, name, group, options) for place in places], []
+    return [
+        LogSpec(
+            folder_name(name or place.name),
+            group,
+            place.source,
+            place.shown,
+            None,
+            options,
+            configs,
+        )
+        for place in places
+    ], []
 
 
-def _log(place: Place, name: str | None, group: str, options: Mapping[str, Any]) -> LogSpec:
-    return LogSpec(folder_name(name or place.name), group, place.source, place.shown, None, options)
-
-
-def _simulated(table: Mapping[str, Any], where: str, group: str, folder: Path) -> list[LogSpec]:
+def _simulated(
+    table: Mapping[str, Any],
+    where: str,
+    group: str,
+    configs: tuple[str, ...] | None,
+    folder: Path,
+) -> list[LogSpec]:
     """A log for each seed."""
     fields = hints(Simulation)
-    check_keys(table, ("name", "group", "runs", *fields), where)
+    check_keys(table, ("name", "group", "configs", "runs", *fields), where)
     values = {
         key: value_of(table[key], fields[key], f"{where} {key}") for key in table if key in fields
     }
     for key in ("scenario", "sensor"):
         if key in values:
-            values[key] = _beside(values[key], folder)
+            values[key] = beside(values[key], folder)
     runs = value_of(table.get("runs", 1), int, f"{where} runs")
     first = Simulation(**values)
     if runs < 1 or first.seed < 0:
@@ -301,17 +327,10 @@ def _simulated(table: Mapping[str, Any], where: str, group: str, folder: Path) -
             None,
             f"{table['scenario']} seed {seed}",
             Simulation(**{**values, "seed": seed}),
+            configs=configs,
         )
         for seed in range(first.seed, first.seed + runs)
     ]
-
-
-def _beside(name: str, folder: Path) -> str:
-    """A file named in the suite, relative to it; any other name as it is."""
-    path, comma, rest = expanded(name).partition(",")
-    if Path(path).suffix.lower() not in (".toml", ".gpx", ".geojson", ".json", ".csv"):
-        return name
-    return f"{folder / path}{comma}{rest}"
 
 
 def _config(table: Mapping[str, Any], where: str, folder: Path) -> ConfigSpec:
@@ -366,3 +385,10 @@ def _check_names(logs: Sequence[LogSpec], configs: Sequence[ConfigSpec], path: P
                     f"({seen[spec.name.lower()]} and {shown}); give each a name of its own"
                 )
             seen[spec.name.lower()] = shown
+    names = [config.name for config in configs]
+    for log in logs:
+        for name in log.configs or ():
+            if name not in names:
+                raise ConfigError(
+                    f"{path}: [[log]] {log.shown}: no configuration {name!r}{nearest(name, names)}"
+                )

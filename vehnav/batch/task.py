@@ -87,8 +87,7 @@ def tasks_of(suite: Suite, out: Path) -> list[Task]:
             keep=suite.keep,
             out=str(out),
         )
-        for config in suite.configs
-        for log in suite.logs
+        for log, config in suite.matrix()
     ]
 
 

@@ -212,7 +212,7 @@ def _baseline(suite: Suite, options: dict[str, Any]) -> Baseline | None:
 def _run(suite: Suite, out: Path, options: dict[str, Any], *, quiet: bool) -> Results:
     from vehnav.batch.runner import run_suite
 
-    total = len(suite.logs) * len(suite.configs)
+    total = len(suite.matrix())
     with (
         _stopped_like_ctrl_c(),
         progress(f"{suite.name}: {total} runs", total=total, quiet=quiet) as advance,

@@ -11,6 +11,8 @@ from vehnav.batch.regression import Change, Comparison
 
 ROWS: Final = 20
 """Of a group; those that pass and are not among the worst are counted."""
+LONGEST: Final = 110
+"""Characters of an error; results.json has it whole."""
 SHOWN: Final = (
     ("max m", "errors.horizontal_m.max"),
     ("rms m", "errors.horizontal_m.rms"),
@@ -71,7 +73,8 @@ def _cells(row: Result, change: Change | None) -> list[str]:
 def _remark(row: Result, change: Change | None) -> str:
     """Why it failed, else how it moved."""
     if row.status != "ok":
-        return wording.state_text(row)
+        text = wording.state_text(row)
+        return text if len(text) <= LONGEST else text[: LONGEST - 3] + "..."
     texts = [_bar(row)] if not row.passed else []
     if row.damaged:
         texts.append("damaged log")
