@@ -135,6 +135,17 @@ def test_names_of_any_kind(tmp_path: Path) -> None:
     }
 
 
+def test_few_logs_of_odd_names_are_listed_one_by_one(tmp_path: Path) -> None:
+    """As patterns their brackets would mean something else."""
+    for name in ("x [y]/a[1].csv", "x [y]/a1.csv", "b.csv"):
+        log(tmp_path / name)
+    made = write_example(tmp_path)
+    assert len(tomllib.loads(made.path.read_text())["log"]) == 3
+    assert sources(load_suite(made.path)) == {
+        (tmp_path / name).resolve() for name in ("x [y]/a[1].csv", "x [y]/a1.csv", "b.csv")
+    }
+
+
 def test_twins_of_one_stem_get_names(tmp_path: Path) -> None:
     for name in ("a/run.csv", "b/run.csv", "a-run.csv", "a/run.txt"):
         log(tmp_path / name)

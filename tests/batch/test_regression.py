@@ -58,6 +58,19 @@ def test_what_is_as_good_as_zero_never_fails() -> None:
     assert not against(before, scaled(before, lambda _: 100.0)).passed  # 1 mm to 10 cm
 
 
+def test_from_nothing_the_floor_is_the_measure() -> None:
+    assert worsening(0.0, 0.05, direction="less", floor=0.01) == pytest.approx(5.0)
+    assert worsening(0.002, 0.052, direction="less", floor=0.01) == pytest.approx(5.0)
+
+
+def test_a_suite_of_one_group_is_told_once() -> None:
+    before = suite(ok(f"{k}", 10.0) for k in range(8))
+    assert {p.group for p in against(before, before).paired} == {"city"}
+    assert {p.group for p in against(many(9), many(9)).paired} == {
+        None, "city", "highway", "mountain road",
+    }  # fmt: skip
+
+
 def test_one_log_ten_times_worse_fails_and_is_named() -> None:
     before = many(90)
     found = against(before, scaled(before, lambda k: 10.0 if k == 17 else 1.0))

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import pytest
-from batch_for_tests import MAX, broken, ok, suite
+from batch_for_tests import MAX, RMS, broken, ok, suite
 
 from vehnav.batch.baseline import baseline_of
+from vehnav.batch.model import BarResult, Result
 from vehnav.batch.regression import Paired, compare_with
 from vehnav.batch.wording import (
     headline,
@@ -51,6 +52,13 @@ def test_what_did_not_run_comes_first_then_missed_bars_then_the_largest() -> Non
     rows = [ok("small", 1.0), ok("far", 80.0), ok("large", 30.0), broken("dead"), ok("none", None)]
     order = [r.log for r in worst_first(rows)]
     assert order == ["dead", "none", "far", "large", "small"]
+
+
+def test_the_more_bars_are_missed_the_worse() -> None:
+    one = ok("one", 99.0)
+    bars = (*one.bars, BarResult.of(RMS, "max", 1.0, 30.0))
+    two = Result(**{**vars(ok("two", 60.0)), "bars": bars})
+    assert [r.log for r in worst_first([one, two])] == ["two", "one"]
 
 
 def test_a_group_in_one_sentence() -> None:
