@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import pytest
@@ -57,6 +58,20 @@ def test_csv_holds_every_source():
     assert squares**0.5 == pytest.approx(float(total[6]), rel=1e-5)
 
 
+def test_the_readme_shows_what_the_command_prints(sample_logs: Path, monkeypatch):
+    root = sample_logs.parent
+    monkeypatch.chdir(root)
+    text = (root / "README.md").read_text(encoding="utf-8")
+    command = "$ vehnav budget sample_logs/city.mcap --at 60,150,300\n"
+    shown = text.split(command)[1].split("```")[0].rstrip().splitlines()
+    printed = call("sample_logs/city.mcap", "--at", "60,150,300").stdout.splitlines()
+    number = re.compile(r"\d+\.?\d*")
+    for ours, theirs in zip(printed[: len(shown)], shown, strict=True):
+        assert number.sub("#", ours).split() == number.sub("#", theirs).split()
+        numbers = [[float(x) for x in number.findall(line)] for line in (ours, theirs)]
+        assert numbers[0] == pytest.approx(numbers[1], rel=0.02)
+
+
 def test_models_and_vertical_channel_differ():
     drms = {
         (model, vertical): document(
@@ -90,7 +105,11 @@ def test_solve_and_its_check():
     inverse = found["inverse"]
     assert inverse["feasible"] is True
     assert inverse["achieved_m"] == pytest.approx(40.0, rel=1e-6)
-    assert {row["parameter"] for row in inverse["allowed"]} >= {"gyro_bias", "arw", "heading"}
+    rows = {row["parameter"]: row for row in inverse["allowed"]}
+    assert set(rows) >= {"gyro_bias", "arw", "heading"}
+    assert rows["gyro_bias"]["value"] > 1.0  # deg/h, what the hg1700 has
+    assert "hg1700" in rows["gyro_bias"]["grades"]
+    assert "l3g4200d" not in rows["gyro_bias"]["grades"]
     text = call(DRIVE, "--require", "40", "--solve", "scale", "--mc", "5").stdout
     assert "achieved: cep95 40 m at 150 s" in text
     assert "Monte Carlo: 5 runs" in text

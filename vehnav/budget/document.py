@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from vehnav.budget.forward import Budget
-from vehnav.budget.inverse import Solution
+from vehnav.budget.inverse import Solution, grades_within
 from vehnav.budget.montecarlo import MonteCarlo
 from vehnav.budget.sources import INITIAL_UNITS
 from vehnav.budget.study import Interval, Study
@@ -105,7 +105,7 @@ def inverse_document(found: Solution) -> dict[str, Any]:
         "allowed": [
             {
                 "parameter": a.parameter, "value": a.value, "unit": a.unit, "given": a.given,
-                "factor": a.factor,
+                "factor": a.factor, "grades": list(grades_within(a)),
             }
             for a in found.allowed
         ],

@@ -17,7 +17,7 @@ from vehnav.budget.forward import EAST_NORTH, Budget
 from vehnav.budget.metrics import METRICS, drms
 from vehnav.budget.sources import CONSTANT, INITIAL_UNITS, Initial, parameter_value, unit_of
 from vehnav.errors import ConfigError
-from vehnav.sensors import FIELDS, Sensor
+from vehnav.sensors import CATALOGUE, FIELDS, Sensor
 
 Array = npt.NDArray[np.float64]
 
@@ -51,6 +51,21 @@ class Allowed:
     def factor(self) -> float | None:
         """Allowed over given; None where there is none in hand."""
         return self.value / self.given if self.given > 0.0 else None
+
+
+def grades_within(allowed: Allowed) -> tuple[str, ...]:
+    """Grades of the catalogue that have no more of a parameter than is allowed.
+
+    Empty for what is not of the sensor; a grade without a figure for it is not named.
+    """
+    if allowed.parameter in INITIAL_UNITS:
+        return ()
+    factor, _ = unit_of(allowed.parameter)
+    values = {
+        name: parameter_value(sensor, Initial(), allowed.parameter) / factor
+        for name, sensor in CATALOGUE.items()
+    }
+    return tuple(name for name, x in values.items() if 0.0 < x <= allowed.value * (1.0 + 1e-9))
 
 
 @dataclass(frozen=True)

@@ -288,7 +288,7 @@ def _solved(study: Study, sensor: Sensor, options: Mapping[str, Any], *, quiet: 
     need = Requirement(options["require"], options["metric"], study.time)
     made = study.budget(sensor)
     solution = solve(made, need, options["solve"])
-    lines = inverse_lines(study, solution)
+    lines = inverse_lines(study, solution, sensor.name)
     document = {**study_document(study), "sensor": sensor.name,
                 "inverse": inverse_document(solution)}  # fmt: skip
     if options["mc"] is not None and solution.feasible:

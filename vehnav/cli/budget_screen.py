@@ -97,19 +97,23 @@ def drawn_lines(drawn: MonteCarlo, budget: Budget, times: tuple[float, ...]) -> 
     return lines
 
 
-def inverse_lines(study: Study, found: Solution) -> list[str]:
-    """What a requirement allows."""
+def inverse_lines(study: Study, found: Solution, name: str) -> list[str]:
+    """What a requirement allows, beside the sensor in hand (``name``) and the catalogue."""
+    from vehnav.budget.inverse import grades_within
+
     need = found.requirement
     lines = [*assumptions(study), ""]
     lines.append(f"{need.metric} of {need.value:g} m at {need.time:g} s, --solve {found.how}")
     if not found.feasible:
         return [*lines, found.text]
-    lines.append(f"{'parameter':24}{'allowed':>12}  {'unit':16}{'in hand':>12}{'factor':>10}")
+    lines.append(
+        f"{'parameter':24}{'allowed':>10} {'unit':15}{name:>15}{'factor':>9}  grades that have it"
+    )
     for row in found.allowed:
         factor = "-" if row.factor is None else number(row.factor)
         lines.append(
-            f"{row.parameter:24}{number(row.value):>12}  {row.unit:16}{number(row.given):>12}"
-            f"{factor:>10}"
+            f"{row.parameter:24}{number(row.value):>10} {row.unit:15}{number(row.given):>15}"
+            f"{factor:>9}  {', '.join(grades_within(row)) or '-'}"
         )
     return [*lines, f"achieved: {found.text}"]
 
