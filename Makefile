@@ -11,7 +11,7 @@ BIN := $(VENV)/bin
 endif
 
 .DEFAULT_GOAL := help
-.PHONY: help setup run test test-slow check bench sample-logs clean
+.PHONY: help setup run test test-slow check score gate bench sample-logs clean
 
 help:  ## this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## /{printf "%-14s%s\n", $$1, $$2}' $(firstword $(MAKEFILE_LIST))
@@ -33,6 +33,12 @@ check: $(VENV)/.dev  ## style, types, imports
 	$(BIN)/python -m ruff format --check .
 	$(BIN)/python -m mypy
 	$(BIN)/lint-imports
+
+score: $(VENV)/.package  ## the suite of real drives; says which are not on this machine
+	$(BIN)/vehnav score tests/suites/real.toml
+
+gate: $(VENV)/.package  ## the suite of simulated drives against its baseline
+	$(BIN)/vehnav score tests/suites/simulated.toml
 
 bench: $(VENV)/.test  ## speed, as ratios within one run
 	$(BIN)/python tests/bench
