@@ -18,6 +18,7 @@ from vehnav.config import Config
 from vehnav.errors import ConfigError, LogError
 from vehnav.export.recording import write_recording
 from vehnav.logs.log import Imu, Log
+from vehnav.mounting import c_bs_from_letters, right_handed_axes
 from vehnav.noise import RestNoise, estimate, rest_noise
 from vehnav.noise.earth import earth_rates
 from vehnav.sensors import CATALOGUE, load_sensor
@@ -222,6 +223,25 @@ def test_axes_are_the_sensors_own() -> None:
     found = rest_noise(Log("turned.csv", imu, log.gnss), Config(axes="FUR", stop_threshold=1.5))
     white = [fit.white.value for fit in found.gyro.fits]
     assert white[0] > 5.0 * max(white[1:])
+
+
+@pytest.mark.parametrize("up", ["+x", "-x", "+y", "-y", "-z"])
+def test_on_the_bench_any_side_may_be_up(up) -> None:
+    """An MCAP file declares FLU; a case on its side contradicts it, and nobody drives."""
+    log = straight_log(seconds=16.0, gps=False)
+    assert log.imu is not None
+    turn = next(m for m in sides() if np.argmax(np.abs(m[:, 2])) == "xyz".index(up[1])
+                and m[:, 2].sum() == float(up[0] + "1"))  # fmt: skip
+    imu = Imu(log.imu.t_ns, log.imu.gyro @ turn.T, log.imu.accel @ turn.T, axes="FLU")
+    noise = rest_noise(Log("bench.mcap", imu), Config())
+    for fit in noise.gyro.fits:
+        assert fit.white.value == pytest.approx(np.radians(0.05) * 0.1, rel=0.1)
+    assert "axes-unverified" not in [f.code for f in noise.findings]
+
+
+def sides() -> list[np.ndarray]:
+    """Turns of a case onto its sides: the third column is where up goes."""
+    return [c_bs_from_letters(letters).T for letters in right_handed_axes()]
 
 
 # ---- likeness ----------------------------------------------------------------------------------

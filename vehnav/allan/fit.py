@@ -43,6 +43,9 @@ PASSES: Final = 3
 """Times the covariance is put to the figures found."""
 QUANTILE: Final = 2.33
 """Sigmas of chi square from which the shortest clusters contradict the rest (1 in 100)."""
+CHANCE: Final = 2.0
+"""Times the least misfit at which a longer range of clusters is preferred: that much is chance at
+the long ones; vibration at the short ones contradicts by factors of ten."""
 LEAST: Final = 4
 """Clusters below which nothing can be fitted."""
 ONE_SIDED: Final = 1.645
@@ -224,7 +227,8 @@ def _fit_axis(
         trials.append((misfit, data, best, freedom, growing))
         if misfit <= 1.0:
             break
-    _, data, best, freedom, growing = min(trials, key=lambda trial: max(trial[0], 1.0))
+    allowed = max(1.0, CHANCE * min(trial[0] for trial in trials))
+    _, data, best, freedom, growing = next(trial for trial in trials if trial[0] <= allowed)
     return _report(data, best, freedom, growing)
 
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from contextlib import suppress
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Final
 
@@ -15,6 +16,7 @@ from vehnav.config import Config
 from vehnav.earth import WGS84, normal_gravity
 from vehnav.errors import Finding, LogError
 from vehnav.logs.log import Log
+from vehnav.mounting import right_handed_axes
 from vehnav.noise.earth import earth_rates
 from vehnav.pipeline import StopSearch, search_stops
 from vehnav.units import DEG
@@ -121,7 +123,7 @@ def rest_noise(log: Log, config: Config = DEFAULTS) -> RestNoise:
     LogError
         As :func:`vehnav.pipeline.search_stops`; or the log has no rest of three seconds.
     """
-    search = search_stops(log, config)
+    search = _search(log, config)
     samples = search.samples
     spans = _rest_spans(search)
     _check_length(log.path, search, spans)
@@ -138,6 +140,8 @@ def rest_noise(log: Log, config: Config = DEFAULTS) -> RestNoise:
     gyros = _instrument(rates, float(dt), means)
     accels = _instrument([accel[a : b + 1] for a, b in spans], float(dt), None)
     bias, sigma = _bias(gyros, means)
+    # which way is forward matters to no figure
+    about = [f for f in samples.findings if f.code != "axes-unverified"]
     return RestNoise(
         log,
         search,
@@ -148,8 +152,36 @@ def rest_noise(log: Log, config: Config = DEFAULTS) -> RestNoise:
         sigma,
         int(np.count_nonzero(np.isfinite(earth.headings))),
         _gravity(log),
-        (*log.findings, *samples.findings, *_dead_axes(gyros, accels)),
+        (*log.findings, *about, *_dead_axes(gyros, accels)),
     )
+
+
+def _search(log: Log, config: Config) -> StopSearch:
+    """The stops; a case that lies on its side on a bench is as good as any.
+
+    Where gravity contradicts the axes of the format and no drive shows the true ones, any axes
+    that fit gravity do: nothing here hangs on which way is forward.
+    """
+    try:
+        return search_stops(log, config)
+    except LogError:
+        if config.axes not in (None, "auto") or log.imu is None:
+            raise
+        fitting = axes_with_up(log.imu.accel.mean(axis=0))
+        with suppress(LogError):
+            return search_stops(log, replace(config, axes=fitting))
+        raise
+
+
+def axes_with_up(f_s: Array) -> str:
+    """The first right-handed axes whose up is along the largest component of a force (3,).
+
+    >>> axes_with_up(np.array([0.1, -0.2, -9.8]))
+    'BLD'
+    """
+    axis = int(np.argmax(np.abs(f_s)))
+    wanted = "U" if f_s[axis] > 0.0 else "D"
+    return next(letters for letters in right_handed_axes() if letters[axis] == wanted)
 
 
 def _rest_spans(search: StopSearch) -> list[tuple[int, int]]:
