@@ -196,6 +196,25 @@ def test_wander_equals_enu_and_truth_at_55_degrees(azimuth):  # T8, T9
     assert np.max(np.abs(turn - np.eye(3))) < 1e-8
 
 
+def test_order_of_the_engine():  # T8
+    """At least 1.8 between 20 and 5 ms on a town drive, height free."""
+
+    def largest(dt):
+        truth = exact(car(), np.arange(0.0, 200.0 + 0.5 * dt, dt))
+        found = mechanize_wander(
+            truth.increments(),
+            c_we=c_we_from_geodetic(*truth.position[0, :2]),
+            height=truth.position[0, 2],
+            v_w=truth.v_n[0],
+            c_wb=truth.c_nb[0],
+            vertical="free",
+        ).enu()
+        lat, lon, _ = found.position.T
+        return np.max(np.abs(position_difference(lat, lon, *truth.position.T[:2])))
+
+    assert np.log(largest(0.02) / largest(0.005)) / np.log(4.0) > 1.8
+
+
 def crossing(miss, speed=30.0, duration=600.0, rate=100.0):
     """Ideal increments and truth past the pole."""
     truth, imu = ideal_log(
