@@ -184,6 +184,26 @@ def test_the_options_exist(action: dict[str, Any]) -> None:
     assert {"-o", "--junit", "--baseline"} <= named <= options_of_score()
 
 
+def used(workflow: dict[str, Any]) -> list[dict[str, Any]]:
+    """The steps of a workflow that use the action."""
+    every = [step for job in workflow["jobs"].values() for step in job["steps"]]
+    return [step for step in every if "actions/score" in step.get("uses", "")]
+
+
+def check_inputs(step: dict[str, Any], action: dict[str, Any]) -> None:
+    required = {name for name, row in action["inputs"].items() if row.get("required")}
+    assert required <= set(step["with"]) <= set(action["inputs"])
+
+
+def test_our_own_changes_go_through_it(action: dict[str, Any]) -> None:
+    path = ROOT / ".github" / "workflows" / "ci.yml"
+    accepted("vendor.github-workflows", path)
+    (step,) = used(yaml.safe_load(path.read_text(encoding="utf-8")))
+    check_inputs(step, action)
+    assert (ROOT / step["uses"] / "action.yml").is_file()
+    assert (ROOT / step["with"]["suite"]).is_file()
+
+
 # ---- the README --------------------------------------------------------------------------------
 
 
@@ -191,11 +211,8 @@ def test_the_workflow_of_the_readme(action: dict[str, Any], tmp_path: Path) -> N
     path = tmp_path / "workflow.yml"
     workflow = snippet("actions/score", path)
     accepted("vendor.github-workflows", path)
-    (job,) = workflow["jobs"].values()
-    (step,) = [s for s in job["steps"] if "actions/score" in s.get("uses", "")]
-    assert set(step["with"]) <= set(action["inputs"])
-    required = {name for name, row in action["inputs"].items() if row.get("required")}
-    assert required <= set(step["with"])
+    (step,) = used(workflow)
+    check_inputs(step, action)
     named = set(re.findall(r"--[a-z-]+", step["with"].get("args", "")))
     assert named <= options_of_score()
 
