@@ -2,8 +2,8 @@
 
 ``python tests/bench/bench_score.py 1000`` runs that many one-minute drives on all cores instead.
 Wanted: efficiency of at least 0.85 on two cores; memory of the workers flat. On a machine with
-other work the clock shows the others; processor time shows ours: what the suite costs with one worker over
-what it costs with two.
+other work the clock shows the others; processor time shows ours: what the suite costs with one
+worker over what it costs with two.
 """
 
 from __future__ import annotations
