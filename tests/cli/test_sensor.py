@@ -5,8 +5,10 @@ from __future__ import annotations
 import json
 import math
 import re
+import sys
 import tomllib
 from pathlib import Path
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -21,6 +23,7 @@ from vehnav.logs.log import Imu, Log
 from vehnav.mounting import c_bs_from_letters, right_handed_axes
 from vehnav.noise import RestNoise, estimate, rest_noise
 from vehnav.noise.earth import earth_rates
+from vehnav.report.allan_plot import picture, write_allan_plot
 from vehnav.sensors import CATALOGUE, load_sensor
 from vehnav.sensors.likeness import likeness
 from vehnav.simulate.generate import Setup, simulate_runs
@@ -155,9 +158,12 @@ def test_run_and_simulate_take_the_file(city, sample_logs, tmp_path) -> None:
 
 def test_json_is_one_document(known, tmp_path) -> None:
     log = write_recording(straight_log(), tmp_path / "drive.csv")[0]
-    result = vehnav("sensor", log, "--json", "--sensor-name", "my unit")
+    plot = tmp_path / "allan.svg"
+    result = vehnav("sensor", log, "--json", "--sensor-name", "my unit", "--plot", plot)
     found = json.loads(result.stdout)
     assert found["version"] == 1
+    assert found["written"] == [str(plot)]
+    assert plot.is_file()
     assert found["rest"]["total_s"] == pytest.approx(60.0, abs=12.0)  # three stops of 20 s
     assert len(found["rest"]["pieces"]) == 3
     assert found["sensor"]["name"] == "my unit"
@@ -322,9 +328,8 @@ def test_bad_options_are_exit_2(args, says, tmp_path, monkeypatch) -> None:
     assert list(tmp_path.glob("ours*")) + list(tmp_path.glob("allan*")) == []
 
 
-def test_a_name_cannot_break_the_file() -> None:
-    noise = rest_noise(straight_log(), Config(axes="RFU"))
-    text = estimate(noise, name='a"b\n[x]\\').text
+def test_a_name_cannot_break_the_file(stood) -> None:
+    text = estimate(stood, name='a"b\n[x]\\').text
     assert tomllib.loads(text)["sensor"]["name"] == "a_b_[x]_"
 
 
@@ -337,12 +342,15 @@ def test_one_sample_a_second_is_refused(shared_data) -> None:
 # ---- plots -------------------------------------------------------------------------------------
 
 
+@pytest.fixture(scope="module")
+def stood() -> RestNoise:
+    return rest_noise(straight_log(), Config(axes="RFU"))
+
+
 @pytest.mark.parametrize("suffix", ["svg", "html", "png", "pdf"])
-def test_plots(suffix, tmp_path) -> None:
-    log = write_recording(straight_log(), tmp_path / "drive.csv")[0]
+def test_plots(suffix, stood, tmp_path) -> None:
     path = tmp_path / f"allan.{suffix}"
-    result = vehnav("sensor", log, "--plot", path)
-    assert result.exit_code == 0, result.output
+    write_allan_plot(stood, estimate(stood), path)
     content = path.read_bytes()
     start = {"svg": b"<svg", "html": b"<!doctype html>", "png": b"\x89PNG", "pdf": b"%PDF"}
     assert content.startswith(start[suffix])
@@ -353,28 +361,24 @@ def test_plots(suffix, tmp_path) -> None:
             assert f'class="a-{name}"' in text
         assert "http:" not in text.replace("http://www.w3.org/2000/svg", "")
         assert "https:" not in text
+    if suffix == "svg":
+        drawn = ElementTree.fromstring(content)
+        assert drawn.tag.endswith("svg")
 
 
-def test_the_line_of_the_plot_is_the_noise(tmp_path) -> None:
+def test_the_line_of_the_plot_is_the_noise(stood) -> None:
     """0.05 deg/s a sample at 100 Hz: 18 deg/h at 1 s, where the middle of the line must be."""
-    from vehnav.report.allan_plot import picture
-
-    item = picture(rest_noise(straight_log(), Config(axes="RFU")), "gyro")
+    item = picture(stood, "gyro")
     for line in item.lines:
         assert np.interp(0.0, np.log(line.fit_tau), line.fit) == pytest.approx(18.0, rel=0.1)
         assert np.all(line.low < line.value)
         assert np.all(line.value < line.high)
 
 
-def test_plot_without_matplotlib_says_how(tmp_path, monkeypatch) -> None:
-    import sys
-
-    from vehnav.report.allan_plot import write_allan_plot
-
-    noise = rest_noise(straight_log(), Config(axes="RFU"))
+def test_plot_without_matplotlib_says_how(stood, tmp_path, monkeypatch) -> None:
     monkeypatch.setitem(sys.modules, "matplotlib", None)
     with pytest.raises(ConfigError, match=r"vehnav\[plots\]"):
-        write_allan_plot(noise, estimate(noise), tmp_path / "a.png")
+        write_allan_plot(stood, estimate(stood), tmp_path / "a.png")
 
 
 # ---- real logs ---------------------------------------------------------------------------------

@@ -38,8 +38,8 @@ if TYPE_CHECKING:
 @click.option("--sensor-name", metavar="NAME", help="Name of the sensor.  [default: of the log]")
 @option(
     "output", "-o", "--output", metavar="FILE.toml",
-    help="Write a sensor file, for --sensor of run and simulate; what the rest does not tell is "
-    "of the nearest grade of the catalogue, and marked.",
+    help="Write a sensor file, for --sensor of run, simulate and budget; what the rest does not "
+    "tell is of the nearest grade of the catalogue, and marked.",
 )  # fmt: skip
 @option(
     "output", "--plot", metavar="FILE",
