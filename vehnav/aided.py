@@ -16,7 +16,7 @@ import numpy.typing as npt
 from vehnav.aiding.coarse import AT_ONCE, CoarseStart, coarse_start
 from vehnav.aiding.fixes import Fixes
 from vehnav.aiding.known import with_sensor
-from vehnav.aiding.land import LandResult, Tuning, Use, run_land, tuning_from_log
+from vehnav.aiding.land import LandResult, Tuning, Use, run_land, tuning_from_log, with_steady_gyro
 from vehnav.classic import Drive, Outcome
 from vehnav.config import Config, outage_spans
 from vehnav.earth import normal_gravity
@@ -26,7 +26,7 @@ from vehnav.logs.log import Gnss, Log
 from vehnav.start import Alignment, Given, GpsUse
 from vehnav.stops import Stop
 from vehnav.trajectory import Trajectory
-from vehnav.units import NS
+from vehnav.units import DEG, NS
 
 Array = npt.NDArray[np.float64]
 
@@ -101,10 +101,14 @@ def run_aided(
             f"{log.path}: no stop was found and no GPS may be used, so nothing says how the "
             "vehicle starts; give --gps-file, or --start-attitude HEADING,PITCH,ROLL"
         )
+    known = config.known_sensor
     start = coarse_start(
-        drive, fixes, position=given.position, heading=given.heading, attitude=given.attitude
-    )
+        drive, fixes, position=given.position, heading=given.heading, attitude=given.attitude,
+        gyro_bias=None if known is None else known.gyro.bias or None,
+    )  # fmt: skip
     tuning = _tuning(drive, config)
+    if start.compassed and known is not None:
+        tuning = with_steady_gyro(tuning, known.gyro.bias)
     result = run_land(
         drive, start, tuning,
         fixes=fixes if config.uses("gnss") or config.gps == "start" else None,
@@ -223,7 +227,7 @@ def _alignment(
     fixes: Fixes | None,
 ) -> Alignment:
     position_from = "option" if given.position is not None else "gps" if fixes else "none"
-    heading_from = "gps" if start.fitted else "none"
+    heading_from = "gps" if start.fitted else "gyrocompass" if start.compassed else "none"
     if given.heading is not None:
         heading_from = "option"
     elif given.attitude is not None:
@@ -264,7 +268,12 @@ def _findings(
             f"normalised innovation squared {row.mean_nis:.2f}"
         )
         findings.append(Finding("filter-innovations", "info", text))
-    if given.heading is None and given.attitude is None and not start.fitted:
+    sigmas = result.outcome.sigma_heading
+    if start.compassed and sigmas is not None:
+        last = float(sigmas[-1]) / DEG
+        text = f"the Earth rate at rest gives the heading; its sigma at the end is {last:.1f} deg"
+        findings.append(Finding("gyrocompass", "info", text))
+    if given.heading is None and given.attitude is None and not (start.fitted or start.compassed):
         text = "no course of GPS shows the heading at the start: the frame is only local"
         findings.append(Finding("local-frame", "warning", text))
     return findings

@@ -57,6 +57,7 @@ class Config:
     coords : {"auto", "normal", "quasi"}
         Whether quasi-coordinates are written too; ``auto``: in wander axes beyond 85 degrees.
     vertical : {"clamp", "free"}
+        Of the stop methods; the filter always estimates the height.
     ellipsoid : {"wgs84", "krasovsky"}
     levelling_rate : float or None
         k g, 1/s; None: 1 / (t + 0.5 s), the running mean since levelling started.
@@ -134,10 +135,25 @@ class Config:
             raise ConfigError("--aid and --gps aid belong to --method filter or smooth")
         if self.method == "smooth" and self.causal:
             raise ConfigError("--method smooth looks ahead; with --causal use --method filter")
+        for option, given in self._of_the_stops().items():
+            if self.aided and given:
+                raise ConfigError(
+                    f"{option} belongs to --method stops; the filter levels and resets by itself"
+                )
         for text in self.outage:
             outage_spans(text, 0.0)
         if self.outage and self.gps != "aid":
             raise ConfigError("--outage cuts out fixes that aid; it belongs to --gps aid")
+
+    def _of_the_stops(self) -> dict[str, bool]:
+        """Options that mean nothing to the filter, and whether they were given."""
+        return {
+            "--as-published": self.as_published,
+            "--no-levelling": not self.levelling,
+            "--no-reset": not self.reset,
+            "--levelling-rate": self.levelling_rate is not None,
+            "--frame eci": self.frame == "eci",
+        }
 
     @cached_property
     def known_sensor(self) -> Sensor | None:

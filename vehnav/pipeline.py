@@ -223,13 +223,16 @@ def _run_filter(drive: Drive, log: Log, config: Config, samples: Samples) -> Run
 def run_at_found_offset(log: Log, config: Config = DEFAULTS) -> Run:
     """As :func:`run`, with the delay of the GPS taken out that the track shows.
 
-    One number is fitted to the fixes that judge, and said so: it is on request only.
+    One number is fitted to the fixes that judge, and said so: it is on request only. Where GPS
+    aids, a track that it pulls along would hide its delay: then a run without it shows the delay.
     """
-    first = run(log, config)
+    alone = replace(config, gps="start", outage=(), aid=_without_gnss(config.aid))
+    first = run(log, alone if config.gps == "aid" else config)
     found = None if first.errors is None else first.errors.found_offset
     if found is None or log.gnss is None:
         text = "the delay of the GPS cannot be told from the motion: its stamps were left alone"
         unknown = Finding("gps-offset-unknown", "warning", text)
+        first = run(log, config) if config.gps == "aid" else first
         return replace(first, findings=(*first.findings, unknown))
     shifted = replace(log.gnss, t_ns=log.gnss.t_ns + np.int64(round(found.offset / NS)))
     total = log.gps_time_offset + found.offset
@@ -241,6 +244,10 @@ def run_at_found_offset(log: Log, config: Config = DEFAULTS) -> Run:
     said = Finding("gps-offset-applied", "info", text)
     use = replace(second.gps, used_for=(*second.gps.used_for, "time offset"))
     return replace(second, gps=use, findings=(*second.findings, said))
+
+
+def _without_gnss(aid: tuple[str, ...] | None) -> tuple[str, ...] | None:
+    return None if aid is None else tuple(name for name in aid if name != "gnss")
 
 
 def search_stops(log: Log, config: Config = DEFAULTS) -> StopSearch:

@@ -45,7 +45,7 @@ class Alignment:
     heading, pitch, roll : float
         rad
     position_from, heading_from : str
-        ``gps``, ``option``, ``attitude option`` or ``none``.
+        ``gps``, ``option``, ``attitude option``, ``gyrocompass`` or ``none``.
     heading_rms : float or None
         m between the turned first stretch and GPS.
     gyro_bias : (3,)

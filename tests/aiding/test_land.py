@@ -13,8 +13,9 @@ from vehnav.aiding.gaps import bridge_gaps
 from vehnav.aiding.vehicle import SIZE
 from vehnav.config import Config
 from vehnav.earth import WGS84, position_difference
+from vehnav.errors import ConfigError
 from vehnav.logs.log import Speed
-from vehnav.pipeline import run
+from vehnav.pipeline import run, run_at_found_offset
 from vehnav.rotation import c_from_rotvec, c_nb_from_angles
 from vehnav.simulate import GnssModel, WheelModel, simulate
 from vehnav.strapdown.increments import increments_from_rates
@@ -109,6 +110,31 @@ def test_odometer_scale_is_found(town):  # T27: kappa = 2 %
     assert np.max(e) < 3.0
     exact = run(log, Config(method="smooth", gps="aid"))
     assert abs(np.max(e) - np.max(error_of(exact, town))) < 0.2
+
+
+@pytest.mark.slow
+def test_delay_of_gps_that_aids_is_found():
+    """Fixes stamped 0.4 s late; the run that shows the delay is one that they do not pull along."""
+    gnss = GnssModel(noise=0.3, drift=0.3, latency=0.4)
+    way = TOWN.replace("300", "600")  # the delay wants half a dozen turns after the first minute
+    late = simulate(way, sensor="mems-tactical", seed=5, gnss=gnss)
+    config = Config(method="smooth", gps="aid", outage=("120:180",))
+    found = run_at_found_offset(late.log(), config)
+    said = next(f.text for f in found.findings if f.code == "gps-offset-applied")
+    assert float(said.split()[0]) == pytest.approx(-0.4, abs=0.1)
+    assert np.max(error_of(found, late)) < np.max(error_of(run(late.log(), config), late))
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [{"as_published": True}, {"levelling": False}, {"reset": False}, {"levelling_rate": 0.1},
+     {"frame": "eci"}],
+)  # fmt: skip
+def test_options_of_the_stops_are_refused(wrong):
+    for method in ("filter", "smooth"):
+        with pytest.raises(ConfigError, match="--method stops"):
+            Config(method=method, **wrong)
+    Config(method="stops", **wrong)
 
 
 def test_speed_and_constraint_see_no_attitude():  # T28

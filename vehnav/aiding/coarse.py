@@ -33,6 +33,10 @@ LEAST_HEADING: Final = 2.0 * DEG
 """rad: sigma of the best fit of the course."""
 UNKNOWN_HEADING: Final = 60.0 * DEG
 """rad: sigma where nothing tells the heading; the filter may find it, or not."""
+COMPASS_SIGMA: Final = 20.0 * DEG
+"""rad: the Earth rate gives the heading where the gyro's bias leaves less than this open."""
+COMPASS_FACTOR: Final = 3.0
+"""On that sigma at the start: the zero-rate updates, which see the same rate, bring it down."""
 UNKNOWN_SPEED: Final = 10.0
 """m/s: sigma of the velocity of a rolling start without fixes."""
 
@@ -57,6 +61,8 @@ class CoarseStart:
     heading_sigma, tilt_sigma, velocity_sigma, position_sigma : float
     fitted : bool
         Whether the heading is from the course of the fixes.
+    compassed : bool
+        Whether it is from the Earth rate; then no bias has been taken from the rest but about up.
     """
 
     first: int
@@ -73,6 +79,7 @@ class CoarseStart:
     velocity_sigma: float
     position_sigma: float
     fitted: bool
+    compassed: bool = False
 
     @property
     def c_nb(self) -> Array:
@@ -87,6 +94,7 @@ def coarse_start(
     position: Place | None = None,
     heading: float | None = None,
     attitude: tuple[float, float, float] | None = None,
+    gyro_bias: float | None = None,
 ) -> CoarseStart:
     """Find the first state.
 
@@ -97,6 +105,9 @@ def coarse_start(
         Those that may be used, at least two; the first ones show position, course and speed.
     position, heading, attitude
         What is given beats what is found: rad, rad, m; rad; (heading, pitch, roll) rad.
+    gyro_bias : float or None
+        Sigma of the gyro bias where it is known before, rad/s: standing, and with nothing else
+        that tells the heading, the Earth rate may.
     """
     at_once = bool(drive.stops) and drive.stops[0].start < drive.t[0] + AT_ONCE
     standing = at_once or (fixes is None and bool(drive.stops))
@@ -106,8 +117,13 @@ def coarse_start(
     bias, up_b, scale = _rest_figures(drive, standing, gravity)
     turned = _turning(drive, bias, up_b)
     courses = None if fixes is None else _courses(drive, fixes, turned, standing, first)
+    told = heading is not None or attitude is not None
     found, sigma = (0.0, UNKNOWN_HEADING) if courses is None else courses
-    fitted = courses is not None and heading is None and attitude is None
+    north = None
+    if standing and courses is None and not told and gyro_bias is not None:
+        north = _compass(bias, up_b, lat, gyro_bias, drive)
+    if north is not None:
+        found, sigma, bias = north
     if attitude is not None:
         found, sigma = attitude[0], LEAST_HEADING
     if heading is not None:
@@ -127,7 +143,8 @@ def coarse_start(
         tilt_sigma=(1.5 if standing else 3.0) * DEG,
         velocity_sigma=0.1 if standing else rolling_speed,
         position_sigma=0.0 if fixes is None or position is not None else 2.0,
-        fitted=fitted,
+        fitted=courses is not None and not told,
+        compassed=north is not None,
     )  # fmt: skip
 
 
@@ -155,6 +172,23 @@ def _rest_figures(drive: Drive, standing: bool, gravity: float) -> tuple[Array, 
     f = drive.f.mean(axis=0)
     size = float(np.linalg.norm(f))
     return np.zeros(3), f / size, gravity / size
+
+
+def _compass(
+    rate: Array, up_b: Array, lat: float, sigma: float, drive: Drive
+) -> tuple[float, float, Array] | None:
+    """(heading, its sigma, gyro bias) from the mean rate at rest, or None: the bias hides north.
+
+    The level part of the rate is that of the Earth, Omega cos(lat) to the north, plus the bias.
+    The bias about up follows from the rest; level, the filter shares out what the rate shows.
+    """
+    turn, climb = drive.earth.omega_ie * np.cos(lat), drive.earth.omega_ie * np.sin(lat)
+    if sigma >= COMPASS_SIGMA * turn:
+        return None
+    level = c_nb_from_angles(0.0, *_angles(up_b)) @ rate  # right, forward, up at heading zero
+    heading = float(np.arctan2(-level[0], level[1]))
+    bias = (float(rate @ up_b) - climb) * up_b
+    return heading, COMPASS_FACTOR * sigma / float(turn), bias
 
 
 def _turning(drive: Drive, bias: Array, up_b: Array) -> Array:

@@ -129,6 +129,12 @@ def tuning_from_log(drive: Drive, *, tactical: bool | None = None) -> Tuning:
     return Tuning("mems", reason, noise, (0.05 if stopped else 0.1) * DEG, 0.05, 0.005, 0.02)
 
 
+def with_steady_gyro(tuning: Tuning, bias: float) -> Tuning:
+    """For gyrocompassing: the gyro's bias (sigma, rad/s) and no more walk than that in an hour."""
+    walk = min(tuning.noise.gyro_walk, bias / 60.0)
+    return replace(tuning, gyro_prior=bias, noise=tuning.noise._replace(gyro_walk=walk))
+
+
 def run_land(
     drive: Drive,
     start: CoarseStart,
