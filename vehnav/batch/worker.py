@@ -16,6 +16,7 @@ import threading
 import time
 import traceback
 from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any, Final
 
@@ -149,6 +150,8 @@ def score(task: Task) -> dict[str, Any]:
         where = "" if error.filename is None else f"{Path(error.filename).name}: "
         text = f"{task.shown}: {where}{error.strerror or error}"
         answer = {"status": "error", "exit_status": 2, "error": text}
+        with suppress(OSError):
+            remove_outputs(task)  # half of them would look like all
     except Exception as error:
         text = f"internal error: {type(error).__name__}: {_plain(error, task)}"
         answer = {"status": "error", "exit_status": BUG, "error": text}
