@@ -201,7 +201,7 @@ def test_headings_at_the_lights_are_the_true_ones() -> None:
     (made,) = simulate_runs("city,duration=500,idle=0", setup, seed=3, runs=1)
     log = made.log()
     noise = rest_noise(log, Config(axes="RFU"))
-    samples = noise.search.samples
+    samples = noise.searches[0].samples
     c_gyro, _ = samples.orientation.matrices()
     spans = [tuple(np.searchsorted(samples.t, piece)) for piece in noise.pieces]
     spans = [(int(a), int(b) - 1) for a, b in spans]
@@ -243,6 +243,21 @@ def test_on_the_bench_any_side_may_be_up(up) -> None:
     for fit in noise.gyro.fits:
         assert fit.white.value == pytest.approx(np.radians(0.05) * 0.1, rel=0.1)
     assert "axes-unverified" not in [f.code for f in noise.findings]
+
+
+def test_a_hole_cuts_the_log_and_nothing_more() -> None:
+    """30 s without IMU while it drives: the rests on both sides count, on one clock."""
+    log = straight_log(gyro_bias=(0.0, 0.0, 30.0 * DEG_PER_HOUR), noise=0.1)
+    assert log.imu is not None
+    t = (log.imu.t_ns - log.imu.t_ns[0]) * 1e-9
+    kept = (t < 95.0) | (t > 125.0)
+    imu = Imu(log.imu.t_ns[kept], log.imu.gyro[kept], log.imu.accel[kept], axes="RFU")
+    whole = rest_noise(log, Config(axes="RFU"))
+    cut = rest_noise(Log("cut.csv", imu, log.gnss), Config(axes="RFU"))
+    assert len(cut.searches) == 2
+    assert len(cut.pieces) == len(whole.pieces) == 3
+    np.testing.assert_allclose(cut.pieces[:, 0], whole.pieces[:, 0], atol=1.0)
+    assert cut.gyro_bias[2] / DEG_PER_HOUR == pytest.approx(30.0, abs=2.0)
 
 
 def sides() -> list[np.ndarray]:

@@ -17,9 +17,10 @@ from vehnav.earth import WGS84, normal_gravity
 from vehnav.errors import Finding, LogError
 from vehnav.logs.log import Log
 from vehnav.mounting import right_handed_axes
-from vehnav.noise.earth import earth_rates
+from vehnav.noise.earth import EarthRates, earth_rates
 from vehnav.pipeline import StopSearch, search_stops
-from vehnav.units import DEG
+from vehnav.prepare import split_log
+from vehnav.units import DEG, NS
 
 Array = npt.NDArray[np.float64]
 
@@ -67,7 +68,8 @@ class RestNoise:
     Attributes
     ----------
     log : Log
-    search : StopSearch
+    searches : tuple of StopSearch
+        One; several where holes cut the log.
     pieces : (p, 2)
         s from the start of the log, first and last instant of each.
     gyro, accel : Instrument
@@ -84,7 +86,7 @@ class RestNoise:
     """
 
     log: Log
-    search: StopSearch
+    searches: tuple[StopSearch, ...]
     pieces: Array
     gyro: Instrument
     accel: Instrument
@@ -116,43 +118,103 @@ def rest_noise(log: Log, config: Config = DEFAULTS) -> RestNoise:
     """Noise, bias and walk of the sensor from every stop of a log.
 
     Within a stop by the Allan deviation; beyond it by the mean rates of the stops, for the
-    gyroscopes only: the mean of an accelerometer shows the slope of the road.
+    gyroscopes only: the mean of an accelerometer shows the slope of the road. A hole in the IMU cuts
+    the log and does no harm.
 
     Raises
     ------
     LogError
         As :func:`vehnav.pipeline.search_stops`; or the log has no rest of three seconds.
     """
-    search = _search(log, config)
-    samples = search.samples
-    spans = _rest_spans(search)
-    _check_length(log.path, search, spans)
-    t = samples.t
-    dt = sum(t[b] - t[a] for a, b in spans) / sum(b - a for a, b in spans)
-    c_gyro, c_accel = samples.orientation.matrices()
-    gyro, accel = samples.omega @ c_gyro, samples.f @ c_accel  # back to the sensor's own axes
-    start = np.array([t[a] for a, _ in spans]) - 0.5 * dt
-    end = np.array([t[b] for _, b in spans]) + 0.5 * dt
-    earth = earth_rates(log, samples, spans, c_gyro)
-    rates = [gyro[a : b + 1] for a, b in spans]
-    own = np.array([p.mean(axis=0) for p in rates]) - earth.rate
-    means = PieceMeans(start, end, own, earth.variance)
-    gyros = _instrument(rates, float(dt), means)
-    accels = _instrument([accel[a : b + 1] for a, b in spans], float(dt), None)
+    parts, left_out = _parts(log, config)
+    _check_length(log.path, parts)
+    dt = float(sum(p.seconds for p in parts) / sum(p.steps for p in parts))
+    start = np.array([x for p in parts for x in p.instants(0)]) - 0.5 * dt
+    end = np.array([x for p in parts for x in p.instants(1)]) + 0.5 * dt
+    rates = [piece for p in parts for piece in p.pieces(p.gyro)]
+    forces = [piece for p in parts for piece in p.pieces(p.accel)]
+    own = np.array([r.mean(axis=0) for r in rates])
+    earth = np.concatenate([p.earth.rate for p in parts])
+    unknown = np.concatenate([p.earth.variance for p in parts])
+    means = PieceMeans(start, end, own - earth, unknown)
+    gyros, accels = _instrument(rates, dt, means), _instrument(forces, dt, None)
     bias, sigma = _bias(gyros, means)
     # which way is forward matters to no figure
-    about = [f for f in samples.findings if f.code != "axes-unverified"]
+    about = [f for p in parts for f in p.search.samples.findings if f.code != "axes-unverified"]
     return RestNoise(
         log,
-        search,
+        tuple(p.search for p in parts),
         np.stack([start, end], axis=1),
         gyros,
         accels,
         bias,
         sigma,
-        int(np.count_nonzero(np.isfinite(earth.headings))),
+        sum(int(np.count_nonzero(np.isfinite(p.earth.headings))) for p in parts),
         _gravity(log),
-        (*log.findings, *about, *_dead_axes(gyros, accels)),
+        (*log.findings, *left_out, *about, *_dead_axes(gyros, accels)),
+    )
+
+
+@dataclass(frozen=True)
+class _Part:
+    """A stretch of the log without a long hole: its rests, on the sensor's own axes."""
+
+    search: StopSearch
+    spans: list[tuple[int, int]]
+    offset: float
+    gyro: Array
+    accel: Array
+    earth: EarthRates
+
+    @property
+    def seconds(self) -> float:
+        t = self.search.samples.t
+        return float(sum(t[b] - t[a] for a, b in self.spans))
+
+    @property
+    def steps(self) -> int:
+        return sum(b - a for a, b in self.spans)
+
+    def instants(self, end: int) -> list[float]:
+        """First (0) or last (1) instants of the rests, s from the start of the log."""
+        return [float(self.search.samples.t[span[end]]) + self.offset for span in self.spans]
+
+    def pieces(self, values: Array) -> list[Array]:
+        """The rests of an array (n, 3)."""
+        return [values[a : b + 1] for a, b in self.spans]
+
+
+def _parts(log: Log, config: Config) -> tuple[list[_Part], list[Finding]]:
+    """The stretches between holes of over ten seconds that can be used; what of the others."""
+    whole = config.start is not None or config.end is not None
+    logs = [log] if whole else split_log(log)
+    parts: list[_Part] = []
+    failed: list[LogError] = []
+    for piece in logs:
+        try:
+            parts.append(_part(piece, config, log.start_ns))
+        except LogError as error:
+            failed.append(error)
+    if not parts:
+        raise failed[0]
+    out = [
+        Finding("part-left-out", "info", f"between two holes nothing can be learnt: {error}")
+        for error in failed
+    ]
+    return parts, out
+
+
+def _part(log: Log, config: Config, start_ns: int) -> _Part:
+    search = _search(log, config)
+    samples, spans = search.samples, _rest_spans(search)
+    c_gyro, c_accel = samples.orientation.matrices()
+    return _Part(
+        search,
+        spans,
+        (log.start_ns - start_ns) * NS,
+        samples.omega @ c_gyro,
+        samples.f @ c_accel,
+        earth_rates(log, samples, spans, c_gyro),
     )
 
 
@@ -199,17 +261,19 @@ def _rest_spans(search: StopSearch) -> list[tuple[int, int]]:
     return spans
 
 
-def _check_length(path: str, search: StopSearch, spans: list[tuple[int, int]]) -> None:
+def _check_length(path: str, parts: list[_Part]) -> None:
     """LogError where there is nothing to learn from."""
-    t = search.samples.t
-    longest = max((float(t[b] - t[a]) for a, b in spans), default=0.0)
+    lengths = [b - a for p in parts for a, b in zip(p.instants(0), p.instants(1), strict=True)]
+    longest = max(lengths, default=0.0)
     if longest >= NEEDED:
         return
     advice = (
         "Let the vehicle stand for half a minute with the recording running, engine off if you "
         "can; ten minutes and more show the bias instability too"
     )
-    if not search.stops:
+    stops = [(stop.duration, stop.start + p.offset) for p in parts for stop in p.search.stops]
+    if not stops:
+        search = parts[0].search
         quiet = search.quietest()
         raise LogError(
             f"{path}: the vehicle never stands, so nothing tells the sensor's noise from the "
@@ -218,10 +282,10 @@ def _check_length(path: str, search: StopSearch, spans: list[tuple[int, int]]) -
             f"m/s2 (threshold {search.statistics.force_threshold:.2f}); raise --stop-threshold if "
             f"it did stand. {advice}"
         )
-    stop = max(search.stops, key=lambda s: s.duration)
+    duration, begin = max(stops)
     raise LogError(
-        f"{path}: the longest rest, at {max(stop.start, 0.0):.1f} s, lasts {stop.duration:.1f} s, "
-        f"of which {longest:.1f} s are settled; {NEEDED:g} s are needed. {advice}"
+        f"{path}: the longest rest, at {max(begin, 0.0):.1f} s, lasts {duration:.1f} s, of which "
+        f"{longest:.1f} s are settled; {NEEDED:g} s are needed. {advice}"
     )
 
 
