@@ -118,8 +118,8 @@ def rest_noise(log: Log, config: Config = DEFAULTS) -> RestNoise:
     """Noise, bias and walk of the sensor from every stop of a log.
 
     Within a stop by the Allan deviation; beyond it by the mean rates of the stops, for the
-    gyroscopes only: the mean of an accelerometer shows the slope of the road. A hole in the IMU cuts
-    the log and does no harm.
+    gyroscopes only: the mean of an accelerometer shows the slope of the road. A hole in the IMU
+    cuts the log and does no harm.
 
     Raises
     ------
