@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -18,11 +19,12 @@ from vehnav.units import DEG, DEG_PER_HOUR
 NEED = Requirement(100.0, "cep95", 600.0)
 
 
-def budget(grade="hg1700", *, stops=False, initial=None):
+@cache
+def budget(grade="hg1700", *, stops=False):
     ideal, sensor = drive(TOWN), load_sensor(grade)
     procedure = Procedure(stops=ideal.stops if stops else (), levelled=True)
     found = sensitivity(ideal, procedure, processes=processes_of(sensor), at=(600.0,))
-    return Budget(found, sensor, initial or Initial(0.1 * DEG, 0.0, 0.0, 0.0))
+    return Budget(found, sensor, Initial(0.1 * DEG, 0.0, 0.0, 0.0))
 
 
 def forward(solution, of):

@@ -15,14 +15,8 @@ from vehnav.budget.study import Study, interval_sweep, load_initial
 from vehnav.budget_source import file_drive, scenario_drive
 from vehnav.errors import ConfigError, FormatError
 from vehnav.export.formats import write_trajectory
-from vehnav.report.budget_page import (
-    check_output,
-    growth_picture,
-    html_file,
-    spread,
-    svg_file,
-    sweep_picture,
-)
+from vehnav.report.budget_page import check_output, html_file, spread, svg_file
+from vehnav.report.budget_picture import growth_picture, sweep_picture
 from vehnav.sensors import CATALOGUE, load_sensor
 from vehnav.simulate import ideal_log, make_scenario, stamps
 from vehnav.units import DEG

@@ -254,7 +254,7 @@ def _answer(study: Study, found: Run | None, options: Mapping[str, Any], *, quie
 def _forward(study: Study, sensor: Sensor, options: Mapping[str, Any], *, quiet: bool) -> Result:
     from vehnav.budget.document import budget_csv, budget_document, drawn_document
     from vehnav.cli.budget_screen import drawn_lines, forward_lines
-    from vehnav.report.budget_page import growth_picture
+    from vehnav.report.budget_picture import growth_picture
 
     made = study.budget(sensor)
     lines, document = forward_lines(study, made), budget_document(study, made)
@@ -305,7 +305,7 @@ def _solved(study: Study, sensor: Sensor, options: Mapping[str, Any], *, quiet: 
 def _ranked(study: Study, options: Mapping[str, Any]) -> Result:
     from vehnav.budget.document import rank_document
     from vehnav.cli.budget_screen import rank_lines
-    from vehnav.report.budget_page import growth_picture
+    from vehnav.report.budget_picture import growth_picture
     from vehnav.sensors import CATALOGUE
 
     grades = [sensor for name, sensor in CATALOGUE.items() if name != "ideal"]
@@ -327,7 +327,7 @@ def _swept(study: Study, sensor: Sensor, options: Mapping[str, Any]) -> Result:
     from vehnav.budget.document import sweep_document
     from vehnav.budget.study import interval_sweep
     from vehnav.cli.budget_screen import sweep_lines
-    from vehnav.report.budget_page import sweep_picture
+    from vehnav.report.budget_picture import sweep_picture
 
     if not study.drive.stops:
         raise ConfigError(f"{study.drive.name}: no stop, so no interval between stops")

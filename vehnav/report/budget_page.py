@@ -15,15 +15,13 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from vehnav.budget.forward import Budget
-from vehnav.budget.study import Interval, Study
 from vehnav.errors import ConfigError
 from vehnav.export.atomic import atomic_path
+from vehnav.report.budget_picture import Picture
 from vehnav.report.markup import esc, table
 from vehnav.report.page import page, section
 from vehnav.report.scale import log_ticks, number, ticks
 from vehnav.report.sections import unbroken
-from vehnav.report.summary import metres
 
 Array = npt.NDArray[np.float64]
 
@@ -41,146 +39,10 @@ DECADES: Final = 4.0
 """Of the vertical axis, at most."""
 
 
-@dataclass(frozen=True)
-class Line:
-    """One line: label, x and y (n,); ``ended``: it ends where the linear equations do."""
-
-    label: str
-    x: Array
-    y: Array
-    ended: bool = False
-    marked: bool = False
-
-
-@dataclass(frozen=True)
-class Picture:
-    """Error against something.
-
-    Attributes
-    ----------
-    title, headline : str
-    x_title, y_title : str
-    lines : tuple of Line
-    spans : tuple of (start, end)
-        Stops, on the x axis.
-    head, rows
-        The table below the picture.
-    notes : tuple of str
-    """
-
-    title: str
-    headline: str
-    x_title: str
-    y_title: str
-    lines: tuple[Line, ...]
-    spans: tuple[tuple[float, float], ...]
-    head: tuple[str, ...]
-    rows: tuple[tuple[str, ...], ...]
-    notes: tuple[str, ...]
-
-
-METRIC_TEXT: Final = {
-    "drms": "DRMS", "cep50": "radius of the 50 % circle", "cep95": "radius of the 95 % circle",
-    "east": "east, one sigma", "north": "north, one sigma",
-}  # fmt: skip
-
-
 def check_output(path: str | os.PathLike[str]) -> None:
     """ConfigError where the suffix names nothing that can be written."""
     if Path(path).suffix.lower() not in (*PICTURES, *TEXTS):
         raise ConfigError(f"{path}: expected one of {', '.join((*TEXTS, *PICTURES))}")
-
-
-# ---- what is shown -----------------------------------------------------------------------------
-
-
-def growth_picture(study: Study, budgets: Sequence[Budget], metric: str) -> Picture:
-    """Error against time of one or several sensors, the best first."""
-    time = study.time
-    lines = [_growth(budget, metric) for budget in budgets]
-    rows = []
-    for budget in budgets:
-        cells = [_cell(budget, t, metric) for t in study.times]
-        largest = budget.rows(time)[0].source if budget.rows(time) else "none"
-        rows.append((budget.sensor.name, *cells, budget.validity(time).verdict, largest))
-    told = [b for b in budgets if b.validity(time).verdict != "invalid"] or list(budgets[:1])
-    named = [f"{b.sensor.name} {_cell(b, time, metric)}" for b in told]
-    headline = f"{METRIC_TEXT[metric].capitalize()} after {time:g} s: {', '.join(named)}"
-    return Picture(
-        title=title_of(study),
-        headline=headline,
-        x_title="time from the start, s",
-        y_title=f"{METRIC_TEXT[metric]}, m",
-        lines=tuple(lines),
-        spans=study.procedure.stops,
-        head=("sensor", *(f"{t:g} s" for t in study.times), "linear", "largest source"),
-        rows=tuple(rows),
-        notes=_notes(study, any(line.ended for line in lines)),
-    )
-
-
-def title_of(study: Study) -> str:
-    """The drive by its name, without the folder."""
-    name = study.drive.name
-    return Path(name).name if Path(name).suffix else name
-
-
-def _growth(budget: Budget, metric: str) -> Line:
-    """The line of a sensor, up to where the linear equations hold."""
-    end = budget.valid_until()
-    until = np.searchsorted(budget.t, end, side="right")
-    y = budget.curve(metric)
-    if until == budget.t.size:
-        return Line(f"{budget.sensor.name} {metres(float(y[-1]))}", budget.t, y)
-    label = f"{budget.sensor.name}, to {end:.0f} s" if until > 1 else f"{budget.sensor.name}: no"
-    return Line(label, budget.t[:until], y[:until], ended=True)
-
-
-def _cell(budget: Budget, time: float, metric: str) -> str:
-    if budget.validity(time).verdict == "invalid":
-        return "–"
-    return metres(budget.totals(time)[metric])
-
-
-def sweep_picture(study: Study, sweep: Sequence[Interval], metric: str) -> Picture:
-    """Error against the longest time between two corrections."""
-    longest = np.array([item.longest for item in sweep])
-    figures = np.array([item.budget.totals(study.time)[metric] for item in sweep])
-    order = np.argsort(longest, kind="stable")
-    name = sweep[0].budget.sensor.name
-    asked = {0.0: "every stop", None: "no stop"}
-    rows = tuple(
-        (asked.get(s.every, f"{s.every or 0:g} s apart"), str(s.stops), f"{s.longest:.0f} s",
-         metres(f))
-        for s, f in zip(sweep, figures.tolist(), strict=True)
-    )  # fmt: skip
-    return Picture(
-        title=f"{title_of(study)}, {name}",
-        headline=f"{name}: {metres(figures[0])} with every stop, {metres(figures[-1])} without",
-        x_title="longest time without a correction, s",
-        y_title=f"{METRIC_TEXT[metric]} at {study.time:g} s, m",
-        lines=(
-            Line(metres(float(figures[order][-1])), longest[order], figures[order], marked=True),
-        ),
-        spans=(),
-        head=("stops at least", "used", "longest time without", METRIC_TEXT[metric]),
-        rows=rows,
-        notes=_notes(study, False),
-    )
-
-
-def _notes(study: Study, ended: bool) -> tuple[str, ...]:
-    drive, count = study.drive, len(study.procedure.stops)
-    notes = [
-        f"{drive.duration:.0f} s, {drive.path_length() / 1e3:.2f} km; reset and levelling at "
-        f"{count} of {len(drive.stops)} stops; linear error equations of paper 001, one sigma each."
-    ]
-    if ended:
-        notes.append(
-            "A line ends in a ring where its attitude error passes 0.5 rad: beyond, the linear "
-            "equations say nothing but that the sensor is far off (--mc)."
-        )
-    return tuple(notes)
 
 
 # ---- SVG ---------------------------------------------------------------------------------------
@@ -188,15 +50,17 @@ def _notes(study: Study, ended: bool) -> tuple[str, ...]:
 
 @dataclass(frozen=True)
 class Frame:
-    """Ranges of the axes: x linear, y in powers of ten."""
+    """Ranges of the axes: x as it is or in powers of ten, y in powers of ten."""
 
     x: tuple[float, float]
     y: tuple[float, float]
+    log_x: bool
 
     def place(self, x: Array | float, y: Array | float) -> tuple[Array, Array]:
         """Where values stand in the drawing."""
         left, top, right, bottom = BOX
-        u = (np.asarray(x) - self.x[0]) / (self.x[1] - self.x[0])
+        across = np.log10(x) if self.log_x else np.asarray(x)
+        u = (across - self.x[0]) / (self.x[1] - self.x[0])
         low = 10.0 ** self.y[0]
         v = (np.log10(np.maximum(y, low)) - self.y[0]) / (self.y[1] - self.y[0])
         return left + u * (right - left), bottom - v * (bottom - top)
@@ -210,11 +74,13 @@ def frame_of(item: Picture) -> Frame:
     least = math.log10(float(positive.min())) - 0.1 if positive.size else high - 1.0
     low = min(max(least, high - DECADES), high - 0.5)
     x = np.concatenate([line.x for line in item.lines])
-    first = 0.0 if x.min() >= 0.0 else float(x.min())
-    return Frame((first, float(x.max())), (math.floor(10.0 * low) / 10.0, high))
+    across = (min(0.0, float(x.min())), float(x.max()))
+    if item.log_x:
+        across = (math.log10(float(x.min())) - 0.1, math.log10(float(x.max())) + 0.1)
+    return Frame(across, (math.floor(10.0 * low) / 10.0, high), item.log_x)
 
 
-def draw(item: Picture) -> str:
+def draw(item: Picture, *, titled: bool = True) -> str:
     """The picture, ``WIDTH`` by ``HEIGHT``; classes a page or a style colour."""
     left, top, right, bottom = BOX
     frame = frame_of(item)
@@ -228,7 +94,7 @@ def draw(item: Picture) -> str:
     parts += _grid(frame)
     parts += [
         f'<rect class="box" x="{left}" y="{top}" width="{right - left}" height="{bottom - top}"/>',
-        f'<text class="title" x="{left}" y="18">{esc(item.title)}</text>',
+        f'<text class="title" x="{left}" y="18">{esc(item.title if titled else "")}</text>',
         f'<text x="{left}" y="{top - 8}">{esc(item.y_title)}</text>',
         f'<text x="{0.5 * (left + right)}" y="{HEIGHT - 10}" text-anchor="middle">'
         f"{esc(item.x_title)}</text>",
@@ -245,17 +111,24 @@ def _grid(frame: Frame) -> list[str]:
     left, top, right, bottom = BOX
     out = []
     for value, labelled in log_ticks(*frame.y):
-        y = float(frame.place(frame.x[0], value)[1])
+        y = float(frame.place(1.0, value)[1])
         style = "grid" if labelled else "fine"
         out.append(f'<path class="{style}" d="M{left} {y:.1f}H{right}"/>')
         if labelled:
             text = number(value, 1.0) if value >= 1.0 else f"{value:g}"
             out.append(f'<text x="{left - 6}" y="{y + 4:.1f}" text-anchor="end">{text}</text>')
-    for value in ticks(*frame.x, 8):
+    for value in x_ticks(frame):
         x = float(frame.place(value, 1.0)[0])
         out.append(f'<path class="grid" d="M{x:.1f} {top}V{bottom}"/>')
         out.append(f'<text x="{x:.1f}" y="{bottom + 16}" text-anchor="middle">{value:g}</text>')
     return out
+
+
+def x_ticks(frame: Frame) -> list[float]:
+    """Where the x axis is labelled."""
+    if frame.log_x:
+        return [value for value, labelled in log_ticks(*frame.x) if labelled]
+    return ticks(*frame.x, 8)
 
 
 def _lines(item: Picture, frame: Frame) -> list[str]:
@@ -339,7 +212,8 @@ def html_file(item: Picture) -> str:
     light = _style(".budget", "var(--ink)", "var(--soft)", "var(--grid)", "var(--stop)",
                    "var(--paper)")  # fmt: skip
     style = f"{light}@media (prefers-color-scheme:dark){{{_colours('.budget', DARK)}}}"
-    style += ".budget svg{display:block;width:100%;max-width:980px;height:auto}"
+    style += ".budget{overflow-x:auto}"
+    style += ".budget svg{display:block;width:100%;min-width:640px;max-width:980px;height:auto}"
     rows = [[esc(cell) for cell in row] for row in item.rows]
     last = len(item.head) - 1
     left = (0, last - 1, last) if item.spans or item.head[-1] == "largest source" else (0,)
@@ -348,7 +222,8 @@ def html_file(item: Picture) -> str:
         f"<h1>{esc(unbroken(item.headline))}.</h1>"
         + "".join(f"<p>{esc(note)}</p>" for note in item.notes)
         + f'</header><main><figure class="budget"><svg viewBox="0 0 {WIDTH} {HEIGHT}" role="img" '
-        f'aria-label="{esc(item.y_title)} against {esc(item.x_title)}">{draw(item)}</svg></figure>'
+        f'aria-label="{esc(item.y_title)} against {esc(item.x_title)}">'
+        f"{draw(item, titled=False)}</svg></figure>"
         + section("figures", "Figures", table(item.head, rows, name="Figures", left=left))
         + "</main>"
     )
@@ -386,10 +261,13 @@ def _write_matplotlib(item: Picture, path: Path, suffix: str) -> None:
                       marker="o" if line.marked else None, ms=4, label=line.label)  # fmt: skip
             if line.ended:
                 axes.plot(line.x[-1:], line.y[-1:], "o", ms=4, mfc="white", mec=colour)
-        axes.set(yscale="log", xlim=frame.x, ylim=(10.0 ** frame.y[0], 10.0 ** frame.y[1]))
+        across = (10.0 ** frame.x[0], 10.0 ** frame.x[1]) if frame.log_x else frame.x
+        axes.set(xscale="log" if frame.log_x else "linear", yscale="log", xlim=across)
+        axes.set(ylim=(10.0 ** frame.y[0], 10.0 ** frame.y[1]))
         axes.set(title=item.title, xlabel=item.x_title, ylabel=item.y_title)
         axes.grid(color="#e6e9ed", lw=0.6)
-        axes.legend(frameon=False, fontsize=7.5, loc="upper left", bbox_to_anchor=(1.0, 1.0))
+        if len(item.lines) > 1:
+            axes.legend(frameon=False, fontsize=7.5, loc="upper left", bbox_to_anchor=(1.0, 1.0))
         dated: dict[str, Any] = {"CreationDate": None} if suffix == "pdf" else {}
         with atomic_path(path) as temporary:
             figure.savefig(temporary, format=suffix, dpi=160, metadata=dated)
