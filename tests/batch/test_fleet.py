@@ -49,7 +49,7 @@ def in_this_process(tasks, limits, *, jobs):
 
 
 def without_run(out: Path) -> bytes:
-    return (out / "results.json").read_bytes().partition(b'\n "run": {')[0]
+    return (out / "results.json").read_bytes().partition(b'\n"run": {')[0]
 
 
 def cluster(workers: int, *, processes: bool):

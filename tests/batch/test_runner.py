@@ -54,7 +54,7 @@ QUICK = "[[config]]\nname = 'quick'\ngps_start_seconds = 15\n"
 
 def without_run(path: Path) -> bytes:
     """The file up to the run block, byte by byte."""
-    before, found, _ = path.read_bytes().partition(b'\n "run": {')
+    before, found, _ = path.read_bytes().partition(b'\n"run": {')
     assert found
     return before
 

@@ -164,7 +164,7 @@ class RunBlock:
     host, platform, python, vehnav : str
         Where, and versions.
     jobs : int
-        Workers.
+        Workers; 0: those of a cluster.
     complete : bool
         Whether every log was tried to its end; False while running and after an interruption.
     resumed : int
@@ -235,10 +235,19 @@ class Results:
 
 
 def write_results(results: Results, path: Path) -> None:
-    """Write ``results.json`` whole or not at all; ValueError for a NaN, OSError for the disk."""
-    text = json.dumps(results.to_dict(), indent=1, ensure_ascii=False, allow_nan=False)
-    with atomic_path(path) as temporary:
-        temporary.write_text(text + "\n", encoding="utf-8")
+    """Write ``results.json`` whole or not at all: a result on a line, the run block at the end.
+
+    ValueError for a NaN, OSError for the disk.
+    """
+    with atomic_path(path) as temporary, temporary.open("w", encoding="utf-8") as file:
+        file.write(f'{{"version": {VERSION},\n"suite": {_json(results.suite)},\n"results": [')
+        for k, result in enumerate(results.results):
+            file.write(f"{',' if k else ''}\n{_json(result.to_dict())}")
+        file.write(f'\n],\n"run": {_json(results.run.to_dict())}}}\n')
+
+
+def _json(content: Any) -> str:
+    return json.dumps(content, ensure_ascii=False, allow_nan=False)
 
 
 def read_results(path: str | Path) -> Results:

@@ -95,7 +95,7 @@ def run_suite(
     _remove_old_simulations(tasks, out)
     limits = Limits(suite.time_limit, suite.memory_limit)
     count = max(1, min(jobs or cores(), len(tasks)))
-    found = Collected(suite, out, tasks, earlier, jobs=count)
+    found = Collected(suite, out, tasks, earlier, jobs=count if scheduler is None else 0)
     if not tasks:
         return found.results(complete=True)
     if scheduler is None:
