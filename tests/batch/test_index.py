@@ -173,7 +173,7 @@ def test_written_whole(tmp_path) -> None:
 def test_the_staircase_is_the_share_of_the_logs(n: int) -> None:
     """At any value: how many of the logs are at most that, counted anew."""
     x = np.exp(np.random.default_rng(n).standard_normal(n)) * 20.0
-    text = shares_figure(MAX, [Series("c", "ours", x, np.empty(0))], limits=(), least=0.01, key="k")
+    text = shares_figure(MAX, [Series("c", "ours", x, np.empty(0))], least=0.01, key="k")
     low, high = (float(re.search(rf'data-{k}="([^"]+)"', text).group(1)) for k in ("low", "high"))
     assert low <= x.min()
     assert x.max() <= high
@@ -211,6 +211,32 @@ def test_bars_are_drawn_where_they_are() -> None:
     low, high = (float(re.search(rf'data-{k}="([^"]+)"', text).group(1)) for k in ("low", "high"))
     x = int(re.search(r'class="limit" d="M(\d+) 0', text).group(1))
     assert low * (high / low) ** (x / WIDTH) == pytest.approx(50.0, rel=2e-3)
+
+
+def test_bars_have_the_colour_of_their_configuration_unless_for_all() -> None:
+    def rows(limits: dict[str, float]) -> list[Result]:
+        return [ok("a", 10.0, config=name, limit=limit) for name, limit in limits.items()]
+
+    both = render_index(suite(rows({"x": 30.0, "y": 30.0})))
+    assert re.findall(r'class="(limit[^"]*)" d="M\d+ 0V', both) == ["limit"]
+    each = render_index(suite(rows({"x": 20.0, "y": 30.0})))
+    assert re.findall(r'class="(limit[^"]*)" d="M\d+ 0V', each) == [
+        "limit k-ours",
+        "limit k-free",
+    ]
+    # a bar for every group, or far beyond all errors, would hide the curves
+    many_bars = suite(ok(f"{k}", 10.0, limit=20.0 + k) for k in range(9))
+    assert 'class="limit' not in render_index(many_bars)
+    assert 'class="limit' not in render_index(suite([ok("a", 10.0, limit=5000.0)]))
+
+
+def test_one_value_for_all_logs_is_no_picture() -> None:
+    rows = []
+    for k in range(3):
+        row = ok(f"{k}", 10.0 + k, more={"stops.count": 3.0})
+        bars = (*row.bars, BarResult.of("stops.count", "min", 2.0, 3.0))
+        rows.append(Result(**{**vars(row), "bars": bars}))
+    assert render_index(suite(rows)).count('<figure class="panel shares') == 1
 
 
 def test_a_figure_with_a_bar_gets_a_picture_of_its_own() -> None:

@@ -8,7 +8,7 @@ styles they use.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Sequence, Set
 from dataclasses import dataclass
 from typing import Final
 
@@ -29,7 +29,7 @@ STEPS: Final = 400
 """Of a curve: more are not seen."""
 FEW: Final = 40
 """Logs up to which each one is a dot on its curve."""
-MOST_LIMITS: Final = 6
+MOST_LIMITS: Final = 8
 """Bars in a picture; more, for many groups, would hide the curves."""
 MANY: Final = 600
 """Points from which they are drawn smaller."""
@@ -100,12 +100,15 @@ class Series:
         Of now, none of them missing.
     before : (m,) float64
         Of the baseline; empty without one.
+    limits : set of float
+        Its bars.
     """
 
     name: str
     role: str
     values: Array
     before: Array
+    limits: Set[float] = frozenset()
 
 
 @dataclass(frozen=True)
@@ -136,28 +139,28 @@ def _with_room(values: Array) -> Array:
 # ---- shares ------------------------------------------------------------------------------------
 
 
-def shares_figure(
-    metric: str, series: Sequence[Series], *, limits: Sequence[float], least: float, key: str
-) -> str:
+def shares_figure(metric: str, series: Sequence[Series], *, least: float, key: str) -> str:
     """Which share of the logs stays under what, for every configuration (markup).
 
     Parameters
     ----------
     metric : str
     series : sequence of Series
-    limits : sequence of float
-        Bars, drawn where they are within the axis.
+        Their bars are drawn where they are near, in the colour of the configuration unless they
+        are for all.
     least : float
         What is smaller is as good as zero.
     key : str
         Of the figure in the page.
     """
     everything = np.concatenate([x for s in series for x in (np.abs(s.values), np.abs(s.before))])
-    near = [x for x in {abs(limit) for limit in limits} if x < 10.0 * everything.max(initial=0.0)]
-    shown = sorted(near) if len(near) <= MOST_LIMITS else []
-    axis = Axis.of(_with_room(np.append(everything, shown)), least=least)
+    bars = _near_bars(series, 10.0 * everything.max(initial=0.0))
+    axis = Axis.of(_with_room(np.append(everything, [limit for limit, _ in bars])), least=least)
     drawn = [_grid(axis, [0.25, 0.5, 0.75])]
-    drawn += [f'<path class="limit" d="M{_px(axis, limit)} 0V{HEIGHT}"/>' for limit in shown]
+    drawn += [
+        f'<path class="limit{" k-" + role if role else ""}" d="M{_px(axis, limit)} 0V{HEIGHT}"/>'
+        for limit, role in bars
+    ]
     drawn += [_staircase(axis, s.before, "before", s.role) for s in series]
     drawn += [_staircase(axis, s.values, "now", s.role) for s in series]
     drawn += [_dots(axis, s.values, s.role) for s in series if s.values.size <= FEW]
@@ -165,7 +168,7 @@ def shares_figure(
     title = f"{esc(metric)} <small>how many % of the logs are under it</small>"
     spoken = "; ".join(f"{s.name}: median {short(_middle(s.values))}" for s in series)
     return _figure(
-        key, "shares", title, _legend(series, shown), "".join(drawn), labels,
+        key, "shares", title, _legend(series, bars), "".join(drawn), labels,
         spoken=f"{metric}, share of the logs. {spoken}", axis=axis, unit=unit_of(metric),
     )  # fmt: skip
 
@@ -198,7 +201,16 @@ def _dots(axis: Axis, values: Array, role: str) -> str:
     return f'<path class="points c-{role}" d="{d}"/>' if d else ""
 
 
-def _legend(series: Sequence[Series], limits: Sequence[float]) -> str:
+def _near_bars(series: Sequence[Series], most: float) -> list[tuple[float, str]]:
+    """Limits under ``most`` and whose they are, "" for all; none where there are too many."""
+    common = frozenset.intersection(*(frozenset(s.limits) for s in series))
+    found = [(abs(limit), "") for limit in common]
+    found += [(abs(limit), s.role) for s in series for limit in s.limits - common]
+    found = sorted(row for row in found if row[0] < most)
+    return found if len(found) <= MOST_LIMITS else []
+
+
+def _legend(series: Sequence[Series], bars: Sequence[tuple[float, str]]) -> str:
     rows = [
         f'<li class="k-{s.role}"><i></i>{esc(s.name)} <output></output></li>'
         for s in series
@@ -206,7 +218,7 @@ def _legend(series: Sequence[Series], limits: Sequence[float]) -> str:
     ]
     if any(s.before.size for s in series):
         rows.append('<li class="k-before"><i></i>baseline</li>')
-    if limits:
+    if bars:
         rows.append('<li class="k-limit"><i></i>bar</li>')
     return f'<ul class="legend">{"".join(rows)}</ul>'
 

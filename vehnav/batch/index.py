@@ -92,8 +92,8 @@ def _header(results: Results, comparison: Comparison | None) -> str:
         red.append("The suite did not run to its end: what follows is what there is.")
     told = ""
     if comparison is not None:
-        text = f"{wording.gate_text(comparison)}."
-        told = f'<p class="{"" if comparison.passed else "red"}">{esc(_sentence(text))}</p>'
+        text = _sentence(f"{wording.gate_text(comparison)}.").replace(" %", "\u00a0%")
+        told = f'<p class="{"" if comparison.passed else "red"}">{esc(text)}</p>'
     cards = "".join(
         f'<div class="figure"><span>{esc(name)}</span><b class="{kind}">{esc(value)}</b>'
         f"<small>{breakable(remark)}</small></div>"
@@ -170,12 +170,9 @@ def _pictures(
     figures = []
     for k, metric in enumerate(metrics[:FIGURES]):
         series = _series(rows, metric, item)
-        if any(s.values.size for s in series):
-            limits = [bar.limit for r in rows for bar in r.bars if bar.metric == metric]
-            least = floor_of(metric)
-            figures.append(
-                shares_figure(metric, series, limits=limits, least=least, key=f"shares-{k}")
-            )
+        found = np.concatenate([np.empty(0), *(x for s in series for x in (s.values, s.before))])
+        if found.size and (k == 0 or np.ptp(found) > 0.0):  # one value for all is no picture
+            figures.append(shares_figure(metric, series, least=floor_of(metric), key=f"shares-{k}"))
         pairs = _pairs(rows, order, metric, item) if k == 0 else []
         if pairs:
             less = directions(rows).get(metric, "less") == "less"
@@ -191,10 +188,13 @@ def _series(rows: Sequence[Result], metric: str, item: Comparison | None) -> lis
     for c in item.changes if item is not None else ():
         if c.metric == metric and c.before is not None:
             before.setdefault(c.config, []).append(c.before)
+    limits: dict[str, set[float]] = {}
+    for r in rows:
+        limits.setdefault(r.config, set()).update(b.limit for b in r.bars if b.metric == metric)
     return [
         Series(
             name, role, _values((r for r in rows if r.config == name), metric),
-            np.array(before.get(name, ()), float),
+            np.array(before.get(name, ()), float), frozenset(limits[name]),
         )
         for name, role in _configs(rows).items()
     ]  # fmt: skip
@@ -256,14 +256,19 @@ def _baseline(item: Comparison | None) -> str:
         lines.append(f"<li>and {len(failed) - SENTENCES} more: see the logs below</li>")
     lines += [f"<li>{esc(text)}</li>" for text in wording.remarks(item, most=20)]
     listed = f'<ul class="said">{"".join(lines)}</ul>' if lines else ""
-    gated = [p for p in item.paired if p.gated]
-    others = [p for p in item.paired if not p.gated]
-    content = listed + _paired_table(gated or others, "Against the baseline")
-    if gated and others:
-        content += (
-            f"<details><summary>{len(others)} more, which the gate does not look at</summary>"
-            f"{_paired_table(others, 'Figures that are not gated')}</details>"
-        )
+    every = not any(p.gated for p in item.paired)
+    gated = [p for p in item.paired if p.gated or every]
+    moved = [p for p in gated if p.worse or p.better]
+    content = listed + _paired_table(moved, "Against the baseline")
+    for rows, what in (
+        ([p for p in gated if not (p.worse or p.better)], "that did not move"),
+        ([p for p in item.paired if not (p.gated or every)], "which the gate does not look at"),
+    ):
+        if rows:
+            content += (
+                f"<details><summary>{len(rows)} more, {what}</summary>{_paired_table(rows, what)}"
+                "</details>"
+            )
     return section("baseline", "Against the baseline", content, PAIRED_NOTE)
 
 

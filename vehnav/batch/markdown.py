@@ -138,7 +138,10 @@ def _baseline(item: Comparison) -> list[str]:
     out += [f"* and {left} more"] * (left > 0)
     out += [f"* {cell(text)}" for text in wording.remarks(item)[:20]]
     out += [""] * (out[-1] != "")
-    shown = [p for p in item.paired if p.gated or (item.max_regression is None and _main(p))]
+    rows = [p for p in item.paired if p.gated or (item.max_regression is None and _main(p))]
+    shown = [p for p in rows if p.worse or p.better]
+    if len(shown) < len(rows):
+        out += [f"{len(rows) - len(shown)} of {len(rows)} compared figures did not move.", ""]
     if shown:
         head = ["group", "configuration", "figure", "logs", "baseline", "now", "median change",
                 "95 %", "verdict"]  # fmt: skip
