@@ -143,6 +143,23 @@ def level_on_parallel(lat, speed, t):
     return Increments(t, omega_b * steps, f_b * steps, np.zeros(t.size - 1, bool))
 
 
+def test_axes_carried_round_a_field_turn_by_its_solid_angle():
+    """East along 40 deg, north to 60, west along 60, south again: (sin 60 - sin 40) times 0.5."""
+    side = np.linspace(0.0, 1.0, 2001)
+    south, north = 40.0 * DEG, 60.0 * DEG
+    lat = np.concatenate([south + 0.0 * side, south + (north - south) * side, north + 0.0 * side,
+                          north - (north - south) * side])  # fmt: skip
+    lon = np.pi - 0.2 + np.concatenate([0.5 * side, 0.5 + 0.0 * side, 0.5 * (1.0 - side),
+                                        0.0 * side])  # fmt: skip
+    lon = np.remainder(lon + np.pi, 2.0 * np.pi) - np.pi  # over the date line
+    turned = quasi.wander_along(np.arange(lat.size), lat, lon)
+    assert turned[-1] == pytest.approx(0.5 * (np.sin(north) - np.sin(south)), abs=1e-9)
+    assert turned[2000] == pytest.approx(-0.5 * np.sin(south), abs=1e-9)
+    diagonal = quasi.wander_along(np.arange(2001), south + (north - south) * side, 0.5 * side)
+    mean = (np.cos(south) - np.cos(north)) / (north - south)  # of sin(lat) along the way
+    assert diagonal[-1] == pytest.approx(-0.5 * mean, abs=1e-7)
+
+
 @pytest.mark.parametrize(
     ("azimuth", "expected"), [("relative", -0.004021372), ("absolute", -0.039861478)]
 )
