@@ -11,8 +11,8 @@ import numpy.typing as npt
 Array = npt.NDArray[np.float64]
 
 NODES: Final = 128
-"""Nodes of the quadrature over the angle: the integrand is periodic and smooth, so the error is that
-of rounding for every ratio of the axes, zero included (6e-12 with half as many)."""
+"""Nodes of the quadrature over the angle: the integrand is periodic and smooth, so its error is
+that of rounding for every ratio of the axes, zero included (6e-12 with half as many)."""
 _HALVINGS: Final = 60
 
 
