@@ -86,8 +86,11 @@ def test_real_logs_show_how_the_sensor_sits(shared_data: Path, case: Real) -> No
     assert orientation.units.as_read
     codes = {finding.code for finding in orientation.findings}
     assert "axes-found" in codes
-    declared = (log.imu.axes, None) if log.imu else None
-    assert ("axes-contradiction" in codes) == (declared != (case.axes, case.accel_axes))
+    assert log.imu is not None
+    assert not log.imu.axes_declared
+    assert ("axes-contradiction" in codes) == (case.accel_axes is not None)
+    unusual = log.imu.axes not in ("", case.axes)
+    assert ("axes-unusual" in codes) == (unusual and case.accel_axes is None)
     if case.mount is not None:
         found, stated = orientation.matrices()[0], sensor_to_body(
             case.axes, mount=tuple(np.radians(case.mount))
@@ -205,7 +208,8 @@ def test_24_axis_orders_give_the_same_body_without_options(letters: str) -> None
     assert (orientation.units.gyro, orientation.units.accel) == units
     codes = [finding.code for finding in found.samples.findings]
     assert ("unit-inferred" in codes) == (units != ("rad/s", "m/s2"))
-    assert ("axes-contradiction" in codes) == (letters != "FLU")
+    assert ("axes-unusual" in codes) == (letters != "FLU")
+    assert "axes-contradiction" not in codes
     assert relative(found.samples.omega, reference().samples.omega) < SAME
     assert relative(found.samples.f, reference().samples.f) < SAME
     assert [(s.first, s.last) for s in found.stops] == [
@@ -271,6 +275,47 @@ def test_forward_that_is_not_shown_is_the_declared_one_and_said() -> None:
     assert orientation.axes == "RFU"
     assert not orientation.evidence.certain
     assert "axes-unverified" in [f.code for f in orientation.findings]
+
+
+@pytest.mark.parametrize(
+    ("axes", "declared", "code", "level"),
+    [
+        ("FLU", True, "axes-contradiction", "warning"),
+        ("FLU", False, "axes-unusual", "info"),
+        ("", False, None, ""),
+        ("BRU", True, None, ""),
+    ],
+)
+def test_a_declaration_is_contradicted_a_custom_is_not(axes, declared, code, level) -> None:
+    """A drive that shows BRU; ROS asks for FLU (REP 103), which is no statement of this file."""
+    log = turned(made(), "BRU")
+    assert log.imu is not None
+    imu = replace(log.imu, axes=axes, axes_declared=declared)
+    orientation = search_stops(replace(log, imu=imu)).samples.orientation
+    assert orientation.axes == "BRU"
+    said = [f for f in orientation.findings if f.code in ("axes-contradiction", "axes-unusual")]
+    assert [(f.code, f.level) for f in said] == ([] if code is None else [(code, level)])
+
+
+@pytest.mark.parametrize(
+    ("axes", "declared", "words"),
+    [
+        ("RFU", True, "axes RFU as the format declares"),
+        ("RFU", False, "axes RFU as usual for such files"),
+        ("", False, "axes FLU assumed, for the file does not say"),
+    ],
+)
+def test_axes_that_nothing_shows_are_said_to_be_so(axes, declared, words) -> None:
+    log = no_stops(straight_log(gps=False, seed=3))
+    assert log.imu is not None
+    imu = replace(log.imu, axes=axes, axes_declared=declared)
+    (finding,) = (
+        f
+        for f in search_stops(replace(log, imu=imu)).samples.findings
+        if f.code == "axes-unverified"
+    )
+    assert words in finding.text
+    assert finding.level == "warning"
 
 
 def test_given_axes_win_and_the_log_is_heard() -> None:

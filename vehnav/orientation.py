@@ -5,6 +5,7 @@ what the physics shows, or established from it where nothing is declared by the 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Final
 
 import numpy as np
 import numpy.typing as npt
@@ -19,6 +20,8 @@ from vehnav.units import DEG
 from vehnav.units_auto import Units, establish_units
 
 Array = npt.NDArray[np.float64]
+USUAL: Final = "FLU"
+"""Axes that are tried where a file says nothing and the drive shows no forward."""
 Angles = tuple[float, float, float]
 
 
@@ -156,7 +159,7 @@ def orient(
     Parameters
     ----------
     imu : Imu
-        Its ``axes`` are what the format declares.
+        Its ``axes`` are what the format declares, or the habit of its kind.
     t : (n,)
         s
     gyro, accel : (n, 3)
@@ -175,10 +178,10 @@ def orient(
         Gravity contradicts the axes that the format declares, and nothing shows the true ones.
     """
     evidence = establish_axes(
-        t, gyro, accel, stops, declared=imu.axes, gps=gps, gps_seconds=gps_seconds
+        t, gyro, accel, stops, declared=imu.axes or USUAL, gps=gps, gps_seconds=gps_seconds
     )
     if declared.axes is not None or declared.accel_axes is not None:
-        axes = declared.axes or imu.axes
+        axes = declared.axes or imu.axes or USUAL
         findings = _against(declared, axes, evidence)
         evidence = replace(evidence, gps_until=None)  # it decided nothing
         return Orientation(
@@ -187,7 +190,7 @@ def orient(
     if not evidence.certain:
         _refuse_against_gravity(path, evidence)
     mount = declared.mount if any(declared.mount) else evidence.mount
-    findings = _found(imu.axes, evidence)
+    findings = _found(imu, evidence)
     return Orientation(evidence.axes, evidence.accel_axes, mount, evidence, units, tuple(findings))
 
 
@@ -216,12 +219,18 @@ def _weakness(evidence: AxesEvidence) -> str:
     return f"{shown}; turns and GPS do not decide it"
 
 
-def _found(declared: str, evidence: AxesEvidence) -> list[Finding]:
-    """What was established, and what it contradicts."""
+def _found(imu: Imu, evidence: AxesEvidence) -> list[Finding]:
+    """What was established, and what it contradicts.
+
+    A declaration that the drive contradicts is a warning, a custom that it does not follow is not:
+    ROS asks for forward-left-up, and many drivers publish what their sensor has.
+    """
     if not evidence.certain:
+        source = "as the format declares" if imu.axes_declared else "as usual for such files"
+        source = source if imu.axes else "assumed, for the file does not say"
         text = (
-            f"axes {evidence.axes} as the format declares: up agrees with gravity, forward is not "
-            f"shown by the drive ({_weakness(evidence)}); --axes says it for sure"
+            f"axes {evidence.axes} {source}: up agrees with gravity, forward is not shown by the "
+            f"drive ({_weakness(evidence)}); --axes says it for sure"
         )
         return [Finding("axes-unverified", "warning", text), *_doubts(evidence)]
     roll, pitch, yaw = (x / DEG for x in evidence.mount)
@@ -232,12 +241,17 @@ def _found(declared: str, evidence: AxesEvidence) -> list[Finding]:
         what += f", mount roll {roll:+.1f}, pitch {pitch:+.1f}, yaw {yaw:+.1f} deg"
     because = "; ".join(evidence.reasons)
     findings = [Finding("axes-found", "info", f"{what}, by {evidence.source}: {because}")]
-    if evidence.axes != declared or evidence.accel_axes is not None:
-        text = (
-            f"the format stands for axes {declared}, the log shows {what} (by {evidence.source}), "
-            "which were taken; --axes overrules it"
-        )
+    if evidence.accel_axes is not None:
+        text = f"the log shows {what} (by {evidence.source}), which were taken; --axes overrules it"
         findings.append(Finding("axes-contradiction", "warning", text))
+    elif imu.axes and evidence.axes != imu.axes:
+        text = (
+            f"{'the format declares' if imu.axes_declared else 'such files usually have'} axes "
+            f"{imu.axes}, the log shows {what} (by {evidence.source}), which were taken; --axes "
+            "overrules it"
+        )
+        code = "axes-contradiction" if imu.axes_declared else "axes-unusual"
+        findings.append(Finding(code, "warning" if imu.axes_declared else "info", text))
     return findings + _doubts(evidence)
 
 

@@ -183,6 +183,7 @@ REAL = [
     ("kitti_oxts/2011_09_30_drive_0027.mcap", [], ".mcap"),
     ("kitti_oxts/2011_09_30_drive_0027.mcap", [], ".csv"),
     ("boston_apan/driving.mcap", ["--axes", "FRD"], ".mcap"),
+    ("dresden_balzer/2014-03-26-000-Data.full.csv", [], ".mcap"),
     *(
         pytest.param(name, ["--axes", axes], suffix, marks=pytest.mark.slow)
         for name, axes, suffix in (
@@ -206,3 +207,39 @@ def test_real_logs_twice_are_the_same(shared_data, tmp_path, name, options, suff
     same(a.gnss, raw.gnss, ("t_ns", "lat", "lon", "height", "v_n", "sigma_pos"))
     assert np.array_equal(np.sort(np.abs(a.imu.gyro)), np.sort(np.abs(raw.imu.gyro)))
     assert np.array_equal(np.sort(np.abs(a.imu.accel)), np.sort(np.abs(raw.imu.accel)))
+
+
+def test_axes_and_units_that_the_drive_shows_are_made_clean(shared_data, tmp_path) -> None:
+    """boston is FRD in a ROS log: the same file with and without --axes FRD."""
+    source = shared_data / "boston_apan/driving.mcap"
+    given, alone = tmp_path / "given.mcap", tmp_path / "alone.mcap"
+    assert run(source, given, "--axes", "FRD").exit_code == 0
+    result = run(source, alone)
+    assert result.exit_code == 0
+    assert "axes FRD, by departures and arrivals" in result.stderr
+    assert given.read_bytes() == alone.read_bytes()
+
+
+def test_units_are_made_si(tmp_path) -> None:
+    """A drive in deg/s and g, said to be rad/s and m/s2, becomes the drive in SI."""
+    from tests.test_axes_auto import made, turned
+
+    drive, raw = turned(made(), "FRD"), turned(made(), "FRD", "deg/s", "g")
+    for name, log in (("si", drive), ("raw", raw)):
+        assert log.imu is not None
+        rows = np.column_stack([log.imu.gyro, log.imu.accel]).tolist()
+        lines = [
+            ",".join([str(t), *map(repr, row)]) for t, row in zip(log.imu.t_ns, rows, strict=True)
+        ]
+        head = "t_ns,wx,wy,wz,ax,ay,az"
+        (tmp_path / f"{name}.csv").write_text("\n".join([head, *lines]) + "\n")
+    columns = "gyro_x=wx,gyro_y=wy,gyro_z=wz,accel_x=ax,accel_y=ay,accel_z=az"
+    for name in ("si", "raw"):
+        target = tmp_path / f"{name}.mcap"
+        result = run(tmp_path / f"{name}.csv", target, "--columns", columns)
+        assert result.exit_code == 0, result.stderr
+    si, raw_back = (read_log(str(tmp_path / f"{name}.mcap")).imu for name in ("si", "raw"))
+    assert isinstance(si, Imu)
+    assert isinstance(raw_back, Imu)
+    np.testing.assert_allclose(raw_back.gyro, si.gyro, rtol=1e-12, atol=1e-18)
+    np.testing.assert_allclose(raw_back.accel, si.accel, rtol=1e-12, atol=1e-15)

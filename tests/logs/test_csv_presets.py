@@ -193,7 +193,8 @@ WRITERS = {
     "dresden": dresden,
     "vehnav": vehnav,
 }
-AXES = {"sensorlog": "RFU", "vehnav": "RFU"}
+AXES = {"sensorlog": "RFU", "vehnav": "RFU", "euroc": "", "racebox": ""}
+"""FLU for the others; "": the layout says nothing."""
 
 
 @pytest.mark.parametrize("case", WRITERS)
@@ -207,6 +208,7 @@ def test_the_same_drive(tmp_path, case):
     np.testing.assert_allclose(log.imu.gyro, GYRO, rtol=TWO_ROUNDINGS)
     np.testing.assert_allclose(log.imu.accel, ACCEL, rtol=TWO_ROUNDINGS)
     assert log.imu.axes == AXES.get(name, "FLU")
+    assert not log.imu.axes_declared
     assert {f.code for f in log.findings} <= {"clock-choice"}
     assert (log.gnss is not None) == (name in HAS_FIXES)
     forced = read_csv(str(path), ReadOptions(preset=name))
@@ -267,7 +269,7 @@ def test_kf_gins(tmp_path, delimiter):
     path.write_text(kf_gins_imu(delimiter=delimiter))
     log = read_log(str(path))
     assert log.imu.sampling == "increments"
-    assert log.imu.axes == "FRD"
+    assert (log.imu.axes, log.imu.axes_declared) == ("FRD", True)
     assert not log.unix_clock
     np.testing.assert_array_equal(log.imu.t_ns, round(SOW * 1e9) + (T - T0))
     half_a_digit = 5.1e-11

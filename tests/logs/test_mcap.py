@@ -254,7 +254,7 @@ def test_the_clock_is_stated_and_can_be_chosen(tmp_path):
     data = mcap(ros_drive(d))
     log = read(tmp_path, data)
     assert "header time" in found(log, "clock")
-    assert log.imu.axes == "FLU"
+    assert (log.imu.axes, log.imu.axes_declared) == ("FLU", False)
     clock = log.contents[0]["clock"]
     assert clock["stamps"] == "header"
     assert clock["offset_s"] == pytest.approx(1e-3)

@@ -429,7 +429,7 @@ def test_px4_counts_microseconds_since_boot(tmp_path):
     np.testing.assert_array_equal(log.imu.t_ns, (d.t - boot) // 1000 * 1000)
     np.testing.assert_array_equal(log.gnss.t_ns, (d.t_gps - boot) // 1000 * 1000)
     assert not log.unix_clock
-    assert log.imu.axes == "FRD"
+    assert (log.imu.axes, log.imu.axes_declared) == ("FRD", True)
     np.testing.assert_array_equal(log.imu.gyro, d.gyro.astype("f4").astype(float))
     np.testing.assert_array_equal(log.gnss.height, d.height)
     np.testing.assert_array_equal(log.gnss.v_n[0], [2.5, 1.5, 0.5])

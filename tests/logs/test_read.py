@@ -86,7 +86,8 @@ def test_mcap_goes_by_its_magic(tmp_path):
 def test_log_alone(tmp_path):
     log = read_log(put(tmp_path / "drive.csv", IMU))
     assert log.imu.t_ns.size == 1000
-    assert log.imu.axes == "RFU"  # vehnav's own table
+    assert log.imu.axes == "RFU"  # vehnav's own table, but others use such names
+    assert not log.imu.axes_declared
     assert log.gnss is None
     assert log.findings == ()
 
@@ -96,7 +97,8 @@ def test_log_alone(tmp_path):
     [("# axes: FRD\n", "FRD"), ("# made by hand, axes=FLU\n", "FLU"), ("# axes unknown\n", "RFU")],
 )
 def test_a_file_may_declare_its_axes(tmp_path, head, axes):
-    assert read_log(put(tmp_path / "drive.csv", head + IMU)).imu.axes == axes
+    imu = read_log(put(tmp_path / "drive.csv", head + IMU)).imu
+    assert (imu.axes, imu.axes_declared) == (axes, "unknown" not in head)
 
 
 def test_a_gps_file_as_log(tmp_path):

@@ -252,7 +252,7 @@ def test_gnss_ins_sim(tmp_path):
     gnss_ins_sim(tmp_path)
     log = read_log(str(tmp_path))
     assert_drive(log, t=T - T0, rtol=2 * TWO_ROUNDINGS)
-    assert log.imu.axes == "FRD"
+    assert (log.imu.axes, log.imu.axes_declared) == ("FRD", True)
     assert not log.unix_clock
     np.testing.assert_array_equal(log.gnss.t_ns, T_FIX - T0)
     np.testing.assert_allclose(np.degrees(log.gnss.lon), LON, rtol=1e-15)
@@ -290,7 +290,7 @@ def test_kitti_oxts(tmp_path, inside):
     kitti(tmp_path)
     log = read_log(str(tmp_path / inside))
     assert_drive(log, rtol=0.0)
-    assert log.imu.axes == "FLU"
+    assert (log.imu.axes, log.imu.axes_declared) == ("FLU", True)
     assert log.findings == ()
     np.testing.assert_allclose(np.degrees(log.gnss.lat), 49.0 + 1e-6 * np.arange(N), rtol=1e-15)
     np.testing.assert_array_equal(log.gnss.v_n, np.tile([2.0, 1.0, 3.0], (N, 1)))

@@ -69,7 +69,8 @@ def convert(
     A trajectory (CSV, Parquet, JSON, TUM, KITTI) becomes any of .csv .parquet .json .tum .kitti
     .gpx .kml .geojson .mcap. A log with an IMU becomes a clean log: .mcap with standard ROS 2
     messages in SI on forward-left-up axes, or .csv on right-forward-up with GPS and speed beside
-    it; both read back bit for bit. A log becomes one of the other formats by its GPS track.
+    it; both read back bit for bit. Axes and units are those that the drive shows, as for run. A
+    log becomes one of the other formats by its GPS track.
     """
     from vehnav.export.load import is_trajectory
 
@@ -131,17 +132,27 @@ def _convert_log(
 def _clean_log(
     log: Log, imu: Imu, target: str, sensor: dict[str, Any]
 ) -> tuple[list[str], list[str]]:
-    from vehnav.export.recording import lost, on_body_axes, write_recording
+    from vehnav.export.recording import (
+        lost,
+        on_body_axes,
+        on_established_axes,
+        write_recording,
+    )
     from vehnav.units import DEG
 
     letters = None if sensor["axes"] == "auto" else sensor["axes"]
     roll, pitch, yaw = (angle * DEG for angle in sensor["mount"])
-    turned = on_body_axes(
-        imu,
-        axes=letters,
-        accel_axes=sensor["accel_axes"],
-        mount=(roll, pitch, yaw),
-        path=log.path,
-    )
+    notes: list[str] = []
+    if letters is None and sensor["accel_axes"] is None:
+        turned, notes = on_established_axes(log, imu, mount=(roll, pitch, yaw))
+    else:
+        turned = on_body_axes(
+            imu,
+            axes=letters,
+            accel_axes=sensor["accel_axes"],
+            mount=(roll, pitch, yaw),
+            path=log.path,
+        )
     files = write_recording(replace(log, imu=turned), target)
-    return [str(path) for path in files], [f"not written: {what}" for what in lost(log, target)]
+    notes += [f"not written: {what}" for what in lost(log, target)]
+    return [str(path) for path in files], notes

@@ -19,6 +19,8 @@ from vehnav.errors import ConfigError, LogError
 from vehnav.export.atomic import atomic_path
 from vehnav.logs.log import Gnss, Imu, Log, Speed
 from vehnav.mounting import gravity_contradiction, sensor_to_body
+from vehnav.orientation import USUAL
+from vehnav.pipeline import search_stops
 from vehnav.rotation import exact_degrees
 
 Array = npt.NDArray[np.float64]
@@ -42,7 +44,7 @@ def on_body_axes(
     ----------
     imu : Imu
     axes, accel_axes : str or None
-        Letters; None: as the format declares, checked against gravity over the log.
+        Letters; None: those of the format, else FLU, checked against gravity over the log.
     mount : (roll, pitch, yaw), rad
     path : str
         For messages.
@@ -52,13 +54,47 @@ def on_body_axes(
     LogError
         Gravity contradicts the axes that the format declares.
     """
-    letters = axes or imu.axes
+    letters = axes or imu.axes or USUAL
     if axes is None:
         contradiction = gravity_contradiction(imu.accel.mean(axis=0), accel_axes or letters)
         if contradiction is not None:
-            raise LogError(f"{path}: {contradiction}. Set --axes (none was given)")
+            raise LogError(f"{path}: {contradiction}. Set --axes (the drive does not show them)")
     c_gyro, c_accel = sensor_to_body(letters, accel_axes=accel_axes, mount=mount)
     return replace(imu, gyro=imu.gyro @ c_gyro.T, accel=imu.accel @ c_accel.T, axes="RFU")
+
+
+def on_established_axes(
+    log: Log, imu: Imu, *, mount: tuple[float, float, float] = (0.0, 0.0, 0.0)
+) -> tuple[Imu, list[str]]:
+    """The samples on right-forward-up, in SI, by the axes and units that the drive shows.
+
+    Only letters and units: the small angles that remain are left in, for turning by them rounds.
+    Where the drive does not show the axes, those of the format count (see :func:`on_body_axes`).
+
+    Returns
+    -------
+    imu : Imu
+    notes : list of str
+        What was established, for a person.
+    """
+    try:
+        shown = search_stops(log).samples.orientation
+    except LogError as error:
+        return on_body_axes(imu, mount=mount, path=log.path), [f"axes as declared: {error}"]
+    if shown.units is not None and not shown.units.as_read:
+        gyro, accel = imu.gyro * shown.units.gyro_scale, imu.accel * shown.units.accel_scale
+        sampling = "increments" if shown.units.increments else imu.sampling
+        imu = replace(imu, gyro=gyro, accel=accel, sampling=sampling)
+    notes = [
+        f"{finding.code}: {finding.text}"
+        for finding in shown.findings
+        if finding.code in ("axes-found", "axes-unverified")
+    ]
+    if not shown.evidence.certain:
+        return on_body_axes(imu, mount=mount, path=log.path), notes
+    letters, accel_letters = shown.axes, shown.accel_axes
+    turned = on_body_axes(imu, axes=letters, accel_axes=accel_letters, mount=mount, path=log.path)
+    return turned, notes
 
 
 def forward_left_up(imu: Imu) -> Imu:

@@ -191,7 +191,8 @@ def _imu(
         where=layout.sheet.path,
     )
     findings.extend(notes)
-    return replace(imu, axes=layout.axes)
+    letters, declared = layout.axes
+    return replace(imu, axes=letters, axes_declared=declared)
 
 
 def _gnss(table: Table, layout: Layout, t_ns: TimeArray, findings: list[Finding]) -> Gnss | None:

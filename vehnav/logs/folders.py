@@ -120,7 +120,7 @@ def read_gnss_ins_sim(path: str, _: ReadOptions) -> Log:
     if _has(folder, "gps-0.csv", "gps_time.csv"):
         gnss, notes = _simulated_gnss(folder)
         findings += notes
-    return _log(path, replace(imu, axes="FRD"), gnss, findings)
+    return _log(path, replace(imu, axes="FRD", axes_declared=True), gnss, findings)
 
 
 def _simulated_gnss(folder: Path) -> tuple[Gnss | None, list[Finding]]:
@@ -221,7 +221,7 @@ def read_kitti_oxts(path: str, _: ReadOptions) -> Log:
         source="oxts",
         where=path,
     )
-    return _log(path, imu, gnss, [*findings, *notes, *more])
+    return _log(path, replace(imu, axes_declared=True), gnss, [*findings, *notes, *more])
 
 
 def _log(path: str, imu: Imu, gnss: Gnss | None, findings: list[Finding]) -> Log:

@@ -58,21 +58,22 @@ class Layout:
         return None
 
     @property
-    def axes(self) -> str:
-        """The axes that the file declares (``# axes: XYZ``), else vehnav's own, else the preset's.
+    def axes(self) -> tuple[str, bool]:
+        """Axis letters and whether they are declared: by ``# axes: XYZ``, or a preset's fixed ones.
 
-        vehnav's own table, recognised by its names, is right-forward-up.
+        vehnav's own table, recognised by its names, is right-forward-up by habit: others use such
+        names too. Letters "": nothing says anything.
         """
         for line in self.sheet.preamble:
             declared = re.search(r"\baxes\s*[:=]\s*([FBLRUD]{3})\b", line)
             if declared:
-                return declared[1]
+                return declared[1], True
         lower = {name.lower() for name in self.sheet.names}
         for kinds in (("gyro", "accel"), ("dtheta", "dvel")):
             own = {f"{kind}_{axis}" for kind in kinds for axis in AXES}
             if own <= lower and lower & {"t_ns", "time_s"}:
-                return "RFU"
-        return self.preset.axes
+                return "RFU", False
+        return self.preset.axes, self.preset.axes_fixed
 
     @property
     def some_inertial(self) -> bool:

@@ -60,8 +60,12 @@ class Imu:
     frame_id : str
         The frame that the log names, or "".
     axes : str
-        Letters of :mod:`vehnav.mounting` that the format declares: FLU for ROS (REP 103), RFU for
-        vehnav's own CSV; a declaration to be checked against gravity, not a fact.
+        Letters of :mod:`vehnav.mounting` that stand where the drive does not show the true ones;
+        "" where the file says nothing of them.
+    axes_declared : bool
+        Whether file or format declare these axes (``# axes: FRD`` in a table, PX4, KF-GINS): what
+        contradicts them is a warning. Else they are the habit of the kind: FLU for ROS (REP 103),
+        RFU for vehnav's own names, a phone's own axes; a log that shows others is no contradiction.
     """
 
     t_ns: TimeArray
@@ -71,6 +75,7 @@ class Imu:
     source: str = ""
     frame_id: str = ""
     axes: str = "FLU"
+    axes_declared: bool = False
 
     def __post_init__(self) -> None:
         _check_clock(self.t_ns, f"IMU {self.source}")

@@ -56,7 +56,9 @@ class Preset:
     units : mapping
         Quantity, or beginning of a quantity up to "_" -> unit, where the header does not say.
     axes : str
-        Where x, y, z of the sensor usually point; a declaration to be checked, not a fact.
+        Where x, y, z of the sensor usually point; "": nobody knows.
+    axes_fixed : bool
+        Whether the format defines them, so that another mounting contradicts it.
     """
 
     name: str
@@ -65,7 +67,8 @@ class Preset:
     detect: tuple[str, ...] = ()
     sample: Callable[[Sheet], bool] | None = None
     units: Mapping[str, str] = field(default_factory=_nothing)
-    axes: str = "FLU"
+    axes: str = ""
+    axes_fixed: bool = False
 
     def matches(self, sheet: Sheet) -> bool:
         """Whether the table is this layout's."""
@@ -139,6 +142,7 @@ PRESETS: Final = (
         sample=headerless.increments,
         units={"time": "s"},
         axes="FRD",
+        axes_fixed=True,
     ),
     Preset(
         name="kf-gins-gnss",
@@ -162,6 +166,7 @@ PRESETS: Final = (
         columns={"time": "field_header_stamp", "log_time": "time", **_ROS_VECTORS, **_ROS_FIX},
         detect=("time", "field_header_stamp"),
         units={**_ROS_UNITS, "time": "ns", "log": "ns"},
+        axes="FLU",
     ),
     Preset(
         name="bagpy",
@@ -175,6 +180,7 @@ PRESETS: Final = (
         },
         detect=("*header_stamp_secs", "*header_stamp_nsecs"),
         units={**_ROS_UNITS, "time": "s", "log": "s"},
+        axes="FLU",
     ),
     Preset(
         name="ros2-csv",
@@ -187,6 +193,7 @@ PRESETS: Final = (
         },
         detect=("*header_stamp_sec", "*header_stamp_nanosec"),
         units={**_ROS_UNITS, "time": "s"},
+        axes="FLU",
     ),
     Preset(
         name="sensorlog",
@@ -240,6 +247,7 @@ PRESETS: Final = (
         },
         detect=("millis", "rollrate", "pitchrate", "yawrate", "ax", "ay", "az"),
         units={"gyro": "deg/s", "accel": "m/s2", "time": "ms", "gps_speed": "km/h"},
+        axes="FLU",  # roll about x, pitch about y, yaw about z
     ),
     Preset(name="vehnav", title="vehnav's own, and any header of known names"),
 )

@@ -15,7 +15,7 @@ from vehnav.errors import ConfigError, Finding, LogError
 from vehnav.evaluation.reference import path_distance
 from vehnav.evaluation.stop_score import score_stops
 from vehnav.export.atomic import atomic_path
-from vehnav.logs.log import Log
+from vehnav.logs.log import Imu, Log
 from vehnav.orientation import Orientation
 from vehnav.pipeline import StopSearch, no_stop_advice, search_stops
 from vehnav.report.document import finding_rows
@@ -138,7 +138,8 @@ def _imu(log: Log) -> dict[str, Any] | None:
         "source": imu.source,
         "frame_id": imu.frame_id,
         "sampling": imu.sampling,
-        "axes_declared": imu.axes,
+        "axes_declared": imu.axes if imu.axes_declared else None,
+        "axes_usual": imu.axes or None,
         **_steps(imu.t_ns, log.start_ns),
     }
 
@@ -179,14 +180,14 @@ def _axes(orientation: Orientation) -> dict[str, Any]:
 
 def screen(inspection: Inspection) -> str:
     """One screen for a person."""
-    found = document(inspection)
+    found, log = document(inspection), inspection.log
     blocks = [
         [f"log        {found['file']}"],
         _integrity_lines(found["integrity"]),
         _content_lines(found["contents"]),
         _record_lines(found),
         _stop_lines(found),
-        _axes_lines(inspection.orientation),
+        _axes_lines(inspection.orientation, log.imu),
     ]
     if found["problem"]:
         blocks.append(["", f"NOT NAVIGABLE: {found['problem']}"])
@@ -255,13 +256,15 @@ def _stop_lines(found: Mapping[str, Any]) -> list[str]:
     return [text, f"           by GPS: {100.0 * score['found']:.0f} % of standing found{wrong}"]
 
 
-def _axes_lines(orientation: Orientation | None) -> list[str]:
+def _axes_lines(orientation: Orientation | None, imu: Imu | None) -> list[str]:
     if orientation is None:
         return []
     evidence, units = orientation.evidence, orientation.units
     source = evidence.source if evidence.certain else "declaration, NOT verified"
     if orientation.axes != evidence.axes:
         source = f"given; the log shows {evidence.axes}"
+    elif imu is not None and imu.axes not in ("", orientation.axes):
+        source += f"; such files {'declare' if imu.axes_declared else 'usually have'} {imu.axes}"
     lines = [f"axes       {axes_text(orientation).removeprefix('axes ')} (by {source})"]
     lines += [f"           {reason}" for reason in evidence.reasons]
     lines += [f"           DOUBT: {doubt}" for doubt in evidence.doubts]

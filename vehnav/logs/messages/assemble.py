@@ -121,7 +121,8 @@ class Assembler:
             raise UnusableError(candidate, str(error)) from error
         self.findings += findings
         self._unix = clock.unix
-        return replace(imu, axes=candidate.role.axes), clock
+        role = candidate.role
+        return replace(imu, axes=role.axes, axes_declared=role.axes_fixed), clock
 
     def _gnss(self, candidate: Candidate, base: Clock | None) -> Gnss | None:
         _, columns = self._columns(candidate)

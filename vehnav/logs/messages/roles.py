@@ -86,7 +86,9 @@ class Role:
         The leaf of the frame id.
     sampling : {"rates", "increments"}
     axes : str
-        Where the axes point by the type's documentation: FLU for ROS (REP 103), FRD for PX4.
+        Where the axes point: FLU by the custom of ROS (REP 103, REP 145), FRD by PX4's definition.
+    axes_fixed : bool
+        Whether the type defines them; a custom is often broken.
     """
 
     name: RoleName
@@ -96,6 +98,7 @@ class Role:
     frame: Path | None = None
     sampling: Literal["rates", "increments"] = "rates"
     axes: str = "FLU"
+    axes_fixed: bool = False
 
     def wanted(self) -> dict[Path, tuple[str, int]]:
         """Leaf -> (quantity, column), as decoders take it."""
@@ -156,7 +159,8 @@ def _imu(path: Path, fields: Fields, chain: Chain) -> Role | None:
     if gyro is None or accel is None or gyro[1] != accel[1]:
         return None
     role = _role("imu", path, chain, {"gyro": gyro[0], "accel": accel[0]}, gyro[1])
-    return replace(role, axes="FRD") if chain[-1].name.startswith("px4_msgs") else role
+    px4 = chain[-1].name.startswith("px4_msgs")
+    return replace(role, axes="FRD", axes_fixed=True) if px4 else role
 
 
 def _named_triple(
