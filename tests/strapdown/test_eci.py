@@ -31,6 +31,7 @@ from vehnav.strapdown.increments import Increments, increments_from_rates
 from vehnav.strapdown.inertial import (
     J2,
     MU,
+    carried,
     earth_spin,
     j2_gravitation,
     local_frame,
@@ -198,6 +199,19 @@ def test_j2_gravitation_is_the_gradient_of_its_potential():
     np.testing.assert_allclose(j2, gradient, atol=1e-7)
     normal = normal_gravitation(tuple(r), np.nan, WGS84)
     assert 3e-5 < np.linalg.norm(np.subtract(j2, normal)) < 1.2e-4 * np.sqrt(2.0)  # spec A 1.2
+
+
+def test_carried_over_the_ground_and_with_the_earth():
+    """A velocity constant in Earth-fixed axes carries a point along a straight line there."""
+    dt, omega = 20.0, np.array([0.0, 0.0, WGS84.omega_ie])
+    r, v_e = np.array([3.1e6, -2.0e6, 5.2e6]), np.array([120.0, 80.0, -60.0])
+    turn = Rotation.from_rotvec(omega * dt)
+    r_new, v_new = carried(
+        tuple(r), tuple(v_e + np.cross(omega, r)), tuple(turn.apply(v_e)), dt, WGS84
+    )
+    wanted = turn.apply(r + v_e * dt)
+    assert np.max(np.abs(np.array(r_new) - wanted)) < 1e-6
+    assert np.max(np.abs(v_new - (turn.apply(v_e) + np.cross(omega, wanted)))) < 1e-9
 
 
 def test_ground_velocity_and_turn_of_the_earth():

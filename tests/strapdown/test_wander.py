@@ -13,7 +13,13 @@ import pytest
 from pyproj import Transformer
 from strapdown_motion import car, exact
 
-from vehnav.earth import WGS84, ecef_from_geodetic, geodetic_from_ecef, position_difference
+from vehnav.earth import (
+    WGS84,
+    curvature_radii,
+    ecef_from_geodetic,
+    geodetic_from_ecef,
+    position_difference,
+)
 from vehnav.rotation import angles_from_c_nb, c_nb_from_angles
 from vehnav.simulate.generate import ideal_log, stamps
 from vehnav.simulate.motion import PolarMotion
@@ -23,8 +29,12 @@ from vehnav.strapdown.increments import Increments
 from vehnav.strapdown.wander import (
     c_nw,
     c_we_from_geodetic,
+    curvature,
+    earth_axis,
     geodetic_from_c_we,
+    mat3,
     mechanize_wander,
+    relative_rate,
 )
 from vehnav.units import DEG, NS
 
@@ -61,6 +71,25 @@ def test_place_matrix_against_pyproj():  # T1
     away = np.abs(lat) < 89.999 * DEG
     for found, given in zip(geodetic_from_c_we(c_we), (lat, lon, wander), strict=True):
         assert np.max(np.abs(found - given)[away]) < 1e-10  # 1e-12 rad over 1 - sin(89.999 deg)
+
+
+@pytest.mark.parametrize("lat", [-40.0 * DEG, 10.0 * DEG, 89.0 * DEG])
+def test_curvature_is_the_tensor_of_the_two_radii(lat):
+    """1 / (R_N + h) along the parallel, 1 / (R_M + h) along the meridian, turned by the angle."""
+    height, wander = 5000.0, 0.8
+    radius_m, radius_n = curvature_radii(lat, height, WGS84)
+    turn = c_nw(wander)[:2, :2]  # wander to east, north
+    wanted = turn.T @ np.diag([1.0 / radius_n, 1.0 / radius_m]) @ turn
+    axis = earth_axis(mat3(c_we_from_geodetic(lat, 0.3, wander)))
+    k11, k12, k22 = curvature(axis, height, WGS84)
+    assert np.allclose([k11, k12, k22], [wanted[0, 0], wanted[0, 1], wanted[1, 1]], rtol=1e-12,
+                       atol=1e-21)  # fmt: skip
+    v = np.array([30.0, -12.0])
+    k = np.array([[k11, k12], [k12, k22]]) @ v
+    rate = relative_rate(axis, height, (*v, 0.0), False, WGS84.omega_ie, WGS84)
+    assert np.allclose(rate, [-k[1], k[0], 0.0], rtol=1e-14)
+    rate = relative_rate(axis, height, (*v, 0.0), True, WGS84.omega_ie, WGS84)
+    assert rate[2] == pytest.approx(-WGS84.omega_ie * np.sin(lat), rel=1e-12)
 
 
 def test_quasi_round_trip():  # T2
@@ -208,6 +237,8 @@ def test_wander_equals_enu_and_truth_at_55_degrees(azimuth):  # T8, T9
             found.position[:, 0], found.position[:, 1], other[:, 0], other[:, 1]
         )
         assert np.max(np.abs(d)) < (1e-6 if other is same.position else 1e-3)
+    assert np.max(np.abs(found.position[:, 2] - same.position[:, 2])) < 1e-6
+    assert np.ptp(truth.position[:, 2]) > 1.0  # it climbs
     assert np.max(np.abs(found.v_n - same.v_n)) < 1e-5
     turn = np.swapaxes(found.c_nb, 1, 2) @ same.c_nb
     assert np.max(np.abs(turn - np.eye(3))) < 1e-8
