@@ -19,7 +19,7 @@ from vehnav.noise.sensor import KEYS, WORDS, Part
 from vehnav.report.markup import esc, table
 from vehnav.report.page import page, section
 from vehnav.report.scale import log_ticks
-from vehnav.report.sensor_text import KINDS, NAMES, figure_text, notes
+from vehnav.report.sensor_text import KINDS, NAMES, figure_text, notes, times_text
 from vehnav.sensors import FIELDS
 from vehnav.units import DEG_PER_HOUR, MILLI_G
 
@@ -277,14 +277,13 @@ def render_page(noise: RestNoise, found: Estimate) -> str:
     )
     name = Path(noise.log.path).name
     count = len(noise.pieces)
-    headline = (
-        f"{noise.total:.0f} s of rest in {count} piece{'s' if count != 1 else ''}, the longest "
-        f"{noise.longest:.0f} s"
-    )
+    headline = f"{noise.total:.0f} s of rest"
+    if count > 1:
+        headline += f" in {count} pieces, the longest {noise.longest:.0f} s"
     untold = "".join(f"<li>{esc(WORDS[k])}: {esc(why)}</li>" for k, why in found.untold.items())
     said = "".join(f"<li>{esc(text)}</li>" for text in notes(noise))
     near = found.grades[0]
-    ratios = ", ".join(f"{WORDS[k]} {r:.2g} times" for k, r in near.ratios.items())
+    ratios = ", ".join(f"{WORDS[k]} {times_text(r)}" for k, r in near.ratios.items())
     body = (
         f'{style}<header class="short"><p class="name">{esc(name)}</p><h1>{esc(headline)}.</h1>'
         f"<p>Nearest grade of the catalogue: {esc(near.name)} ({esc(ratios)}).</p></header><main>"

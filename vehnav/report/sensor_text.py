@@ -188,7 +188,7 @@ def figure_text(figure: Figure, factor: float) -> str:
         power = math.floor(math.log10(sigma))
         lead = sigma / 10.0**power
         digits = min(-power + (1 if lead < 1.95 else 0), 3 - _power(value))
-        shown = [round(x, digits) for x in (value, sigma)]
+        shown = [round(value, digits), max(round(sigma, digits), 10.0**-digits)]
         return " ± ".join(f"{x:.{max(digits, 0)}f}" for x in shown)
     if figure.limit is not None:
         return f"< {two_digits(figure.limit / factor)}"
@@ -197,7 +197,7 @@ def figure_text(figure: Figure, factor: float) -> str:
 
 def _likeness_lines(grades: Sequence[Likeness]) -> list[str]:
     near, following = grades[0], grades[1:2]
-    ratios = ", ".join(f"{WORDS[key]} {_times(ratio)}" for key, ratio in near.ratios.items())
+    ratios = ", ".join(f"{WORDS[key]} {times_text(ratio)}" for key, ratio in near.ratios.items())
     first = (
         f"{near.name}: {ratios}"
         if near.factor < FAR
@@ -207,7 +207,12 @@ def _likeness_lines(grades: Sequence[Likeness]) -> list[str]:
     return ["; ".join([f"{first}; {near.factor:.1f} times away on average", *rest])]
 
 
-def _times(ratio: float) -> str:
+def times_text(ratio: float) -> str:
+    """A ratio in words.
+
+    >>> times_text(1.02), times_text(0.0831), times_text(123.0)
+    ('1.0 times', '0.083 times', '120 times')
+    """
     return f"{ratio:.1f} times" if 0.95 <= ratio < 9.95 else f"{float(f'{ratio:.2g}'):g} times"
 
 
