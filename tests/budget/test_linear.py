@@ -9,10 +9,17 @@ import numpy as np
 import pytest
 from budget_drives import LEVEL, TOWN, apart, drive, error_of_column, perturbed
 
-from vehnav.budget import Budget, Initial, Procedure, drive_of_trajectory, sensitivity
+from vehnav.budget import (
+    Budget,
+    Initial,
+    Procedure,
+    Process,
+    drive_of_trajectory,
+    sensitivity,
+)
 from vehnav.budget.linear import chosen_stops
 from vehnav.budget.sources import CONSTANT, constant_sigmas
-from vehnav.earth import WGS84, curvature_radii, normal_gravity
+from vehnav.earth import WGS84, c_en, curvature_radii, normal_gravity
 from vehnav.sensors import Triad, load_sensor
 from vehnav.simulate import ideal_log, make_scenario, stamps
 from vehnav.units import DEG, DEG_PER_HOUR, DEG_PER_SQRT_HOUR, M_S_PER_SQRT_HOUR, MILLI_G
@@ -59,8 +66,6 @@ def test_closed_forms_of_a_vehicle_at_rest(standing, time):  # T17, spec B 5.4
 
 def test_changing_biases_of_a_vehicle_at_rest():
     """Walk and Markov bias against their closed forms without Schuler feedback (30 s)."""
-    from vehnav.budget import Process
-
     time, tau, g = 30.0, 50.0, normal_gravity(55.0 * DEG, 0.0, WGS84)
     processes = (
         Process("gyro_walk", True, "walk"),
@@ -76,6 +81,24 @@ def test_changing_biases_of_a_vehicle_at_rest():
     s = (np.arange(3000) + 0.5) * time / 3000
     kernel = np.exp(-np.abs(s[:, None] - s) / tau) * (time - s[:, None]) * (time - s)
     assert variance[2] == pytest.approx(kernel.mean() * time**2, rel=2e-3)
+
+
+@pytest.mark.parametrize("gyro_from_stops", [False, True])
+@pytest.mark.parametrize("triad", ["gyro", "accel"])
+def test_a_bias_that_hardly_changes_is_a_constant_one(triad, gyro_from_stops):
+    """Two ways to the same covariance, through levelling and resets: columns, and a process."""
+    ideal = drive(TOWN, 225.0)
+    process = Process(f"{triad}_bias_instability", triad == "gyro", "markov", 1e16)
+    procedure = Procedure(stops=ideal.stops, levelled=True, gyro_from_stops=gyro_from_stops)
+    found = sensitivity(ideal, procedure, processes=(process,), at=(60.0, 225.0))
+    first = 0 if triad == "gyro" else 12
+    for time in (60.0, 225.0):
+        k = found.index(time)
+        columns = found.columns[k][:, first : first + 3]
+        whole, other = columns @ columns.T, found.covariance[k, 0]
+        size = np.sqrt(np.diagonal(whole))
+        rounding = 1e-15  # of terms of size one that cancel
+        assert np.all(np.abs(other - whole) <= 1e-6 * np.outer(size, size) + rounding)
 
 
 @pytest.mark.parametrize("held", [True, False])
@@ -118,8 +141,6 @@ def test_attitude_error_seen_from_inertial_space():  # T16, 001 eq. 12: Psi_i' =
     linear = sensitivity(ideal, Procedure(), at=(600.0,)).columns[-1][:3, :3] @ bias
     t = ideal.t
     angle = ideal.lon + ideal.earth.omega_ie * t  # of the meridian against inertial space
-    from vehnav.earth import c_en
-
     c_in = c_en(ideal.lat, angle)
     c_ib = c_in @ ideal.c_nb
     rate = -0.5 * (c_ib[1:] + c_ib[:-1]) @ bias

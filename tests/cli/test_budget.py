@@ -162,6 +162,13 @@ def test_a_log_is_run_first(sample_logs: Path):
     assert found["initial"]["levelled"] is True
 
 
+def test_one_config_file_serves_run_and_budget(tmp_path: Path):
+    config = tmp_path / "both.toml"
+    config.write_text('[method]\nvertical = "clamp"\nsensor = "hg1700"\n')
+    found = document(DRIVE, "--config", str(config))
+    assert (found["vertical"], found["sensor"]) == ("held", "hg1700")
+
+
 @pytest.mark.parametrize(
     ("args", "words"),
     [

@@ -133,13 +133,18 @@ class Standing:
 
     def level_noise(self, p: Array, processes: tuple[Process, ...], window: float) -> None:
         """The same in place for the covariances ``p`` (n, 12, 12) of unit processes."""
+        _, u_n, u_u = self.omega_ie
         for n, process in enumerate(processes):
-            m = np.eye(12)
-            m[:2] = 0.0
+            level, drift = np.zeros((2, 12)), np.zeros((2, 12))
             if process.gyro:
-                m[:2, 9:] = -0.5 * window * self.c[:2]
+                drift[:, 9:] = -self.c[:2]
             elif process.kind != "white":
-                m[0, 9:], m[1, 9:] = -self.c[1] / self.gravity, self.c[0] / self.gravity
+                level[0, 9:], level[1, 9:] = -self.c[1] / self.gravity, self.c[0] / self.gravity
+            drift[0] += level[1] * u_u
+            drift[1] -= level[0] * u_u
+            drift[0, 2] -= u_n
+            m = np.eye(12)
+            m[:2] = level + 0.5 * window * drift
             p[n] = m @ p[n] @ m.T
             if process.kind == "white":
                 noise = window / 3.0 if process.gyro else 1.0 / (window * self.gravity**2)
@@ -214,11 +219,11 @@ class Propagation:
                 if process.kind == "white":
                     self.p[n, 9:, 9:] = np.eye(3) / length
 
-    def block(self, first: int, last: int) -> tuple[Array, Array, Array, Array]:
+    def block(self, first: int, last: int) -> tuple[Array, ...]:
         """Matrices of the intervals ``first`` to ``last``-1.
 
-        Phi (m, 9, 9), what the sources add (m, 9, 33), Phi of each process (m, n, 12, 12), and
-        variances that come to it, halved (m, n, 12).
+        Phi (m, 9, 9), what the sources add (m, 9, 33), what a gyro correction does (m, 9, 3), Phi
+        of each process (m, n, 12, 12), and variances that come to it, halved (m, n, 12).
         """
         g, rules = self.grid, self.rules
         part = slice(first, last)
@@ -236,24 +241,25 @@ class Propagation:
             gamma[:, :, 5] = 0.0
         c = g.c_nb[part].reshape(m, 3, 3)
         added = gamma[:, :, :6] @ source_rates(c, g.gyro[part].reshape(m, 3, 3, 3), force)
+        corrected = gamma[:, :, :3] @ c
         big = np.zeros((m, len(self.processes), 12, 12))
         half = np.zeros((m, len(self.processes), 12))
         big[:, :, :9, :9] = phi[:, None]
         for n, process in enumerate(self.processes):
             decay = np.exp(-tau[:, 0, 0] / process.time) if process.kind == "markov" else 1.0
-            big[:, n, :9, 9:] = -gamma[:, :, :3] @ c if process.gyro else gamma[:, :, 3:6] @ c
+            big[:, n, :9, 9:] = -corrected if process.gyro else gamma[:, :, 3:6] @ c
             big[:, n, [9, 10, 11], [9, 10, 11]] = np.broadcast_to(decay, (m,))[:, None]
             half[:, n] = 0.5 * tau[:, 0] * self.noise[n]
             if process.kind == "markov":
                 half[:, n, 9:] = 0.5 * (1.0 - np.asarray(decay) ** 2)[:, None]
-        return phi, added, big, half
+        return phi, added, corrected, big, half
 
-    def step(self, phi: Array, added: Array, big: Array, half: Array) -> None:
+    def step(self, phi: Array, added: Array, corrected: Array, big: Array, half: Array) -> None:
         """Over one interval."""
         self.x = phi @ self.x
         self.x[:, :SENSOR_COLUMNS] += added
-        if self.rules.gyro_from_stops and len(self.processes):
-            self.x[:, :SENSOR_COLUMNS] -= big[0, :9, 9:] @ self.applied
+        if self.rules.gyro_from_stops:
+            self.x[:, :SENSOR_COLUMNS] += corrected @ self.applied
         diagonal = np.arange(12)
         self.p[:, diagonal, diagonal] += half
         self.p = big @ self.p @ big.transpose(0, 2, 1)
@@ -269,8 +275,6 @@ def propagate(
     earth: Ellipsoid,
 ) -> tuple[Array, Array]:
     """Errors at the instants ``at`` (q,) of a grid.
-
-    The first process must be one of the gyros.
 
     Returns
     -------

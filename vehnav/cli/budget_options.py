@@ -78,6 +78,7 @@ def model_options(func: F) -> F:
             ),
             option(
                 "stops", "--stops", type=StopsType(), default="auto", show_default=True,
+                metavar="auto|none|every:S",
                 help="Stops at which velocity is reset and the platform levelled: those of the "
                 "drive, none, or those at least S seconds apart.",
             ),
@@ -91,8 +92,8 @@ def model_options(func: F) -> F:
                 help="Take off at every stop the gyro bias that it shows, as `vehnav run` does by "
                 "default.",
             ),
-            option(
-                "method", "--vertical", type=click.Choice(["held", "free"]), default="held",
+            click.option(  # a config file's vertical is that of `vehnav run`
+                "--vertical", type=click.Choice(["held", "free"]), default="held",
                 show_default=True, help="Height from outside, or integrated.",
             ),
             option(
