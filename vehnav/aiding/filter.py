@@ -9,7 +9,7 @@ over the same epochs.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -135,6 +135,19 @@ class Filtered:
     measurements: tuple[Array, Array, Array]
     until: IntArray
     innovations: dict[str, Innovations]
+
+    @property
+    def parameter_sigmas(self) -> Array:
+        """(15,) at the last epoch, where a smoother has nothing to add."""
+        return np.asarray(np.sqrt(np.diagonal(self.covariance[-1]))[9:])
+
+    def light(self) -> Filtered:
+        """Without what only the run back needs: two thirds of the memory."""
+        nothing = np.zeros((0, 0))
+        return replace(
+            self, covariance=self.covariance[-1:].copy(), phi=nothing, decay=nothing,
+            measurements=(nothing, nothing, nothing),
+        )  # fmt: skip
 
 
 @kernel

@@ -20,7 +20,7 @@ from vehnav.aiding.filter import (
 )
 from vehnav.aiding.fixes import Fixes
 from vehnav.aiding.gaps import bridge_gaps
-from vehnav.aiding.smoother import Smoothed, run_smoother
+from vehnav.aiding.smoother import Smoothed, smoothed_errors, take_errors_off
 from vehnav.aiding.vehicle import MEMS, TACTICAL, Noise, Prior
 from vehnav.aiding.vibration import shaken_densities
 from vehnav.classic import Drive, Outcome, StopRecord
@@ -173,10 +173,16 @@ def run_land(
         increments, gaps, aids, _filter_start(start, tuning), noise=tuning.noise,
         absolute=absolute, earth=drive.earth,
     )  # fmt: skip
-    final = run_smoother(increments, aids, forward, earth=drive.earth) if smooth else forward
-    sigmas = np.sqrt(np.diagonal(final.covariance[-1]))[9:]
-    outcome = _outcome(drive, start, increments.t, aids, forward, final)
-    return LandResult(outcome, forward.innovations, final.parameters[-1], sigmas, tuning)
+    innovations, records = forward.innovations, _records(drive, start, aids, forward)
+    final: Filtered | Smoothed = forward
+    if smooth:
+        errors, covariance = smoothed_errors(forward)
+        forward = final = forward.light()
+        final = take_errors_off(increments, aids, forward, errors, covariance, earth=drive.earth)
+    del forward  # rows of an hour twice are too much
+    outcome = _outcome(start, increments.t, aids, final, records)
+    sigmas = final.parameter_sigmas
+    return LandResult(outcome, innovations, final.parameters[-1].copy(), sigmas, tuning)
 
 
 def put_to_epochs(
@@ -243,35 +249,43 @@ def _filter_start(start: CoarseStart, tuning: Tuning) -> FilterStart:
 
 
 def _outcome(
-    drive: Drive,
     start: CoarseStart,
     t: Array,
     aids: Aids,
-    forward: Filtered,
     final: Filtered | Smoothed,
+    records: list[StopRecord],
 ) -> Outcome:
     """In East-North-Up, sigmas interpolated to the instants."""
     rows = final.rows
     lat, lon, wander = geodetic_from_c_we(rows[:, :HEIGHT].reshape(-1, 3, 3))
-    turn = c_nw(wander)
-    at = turn[aids.epochs]
+    at = c_nw(wander[aids.epochs])
     place = at @ final.covariance[:, :3, :3] @ np.swapaxes(at, 1, 2)
     variances = np.column_stack([*(place[:, k, k] for k in range(3)), final.covariance[:, 8, 8]])
     epoch_t = t[aids.epochs]
     sigma = np.sqrt(
         np.maximum(np.column_stack([np.interp(t, epoch_t, x) for x in variances.T]), 0.0)
     )
-    bias = final.parameters[-1, :3]
+    bias = final.parameters[-1, :3].copy()
     return Outcome(
         first=start.first,
         position=np.column_stack([lat, lon, rows[:, HEIGHT]]),
-        v_n=np.einsum("kij,kj->ki", turn, rows[:, V:C]),
-        c_nb=turn @ rows[:, C:].reshape(-1, 3, 3),
-        records=_records(drive, start, aids, forward),
+        v_n=_turned(rows[:, V:C], wander),
+        c_nb=_turned(rows[:, C:].reshape(-1, 3, 3), wander),
+        records=records,
         sigma_pos=sigma[:, :3],
         sigma_heading=sigma[:, 3],
         accel_bias=bias,
     )
+
+
+def _turned(x: Array, wander: Array) -> Array:
+    """(n, 3, ...) from wander axes to East-North-Up, as ``c_nw(wander) @ x`` in less memory."""
+    shape = (-1, *(1 for _ in x.shape[2:]))
+    s, c = np.sin(wander).reshape(shape), np.cos(wander).reshape(shape)
+    out = x.copy()
+    out[:, 0] = c * x[:, 0] - s * x[:, 1]
+    out[:, 1] = s * x[:, 0] + c * x[:, 1]
+    return out
 
 
 def _records(drive: Drive, start: CoarseStart, aids: Aids, forward: Filtered) -> list[StopRecord]:

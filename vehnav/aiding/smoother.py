@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from vehnav.aiding.blocks import blend_corrections, take_off_parameters
+from vehnav.aiding.error_model import NAVIGATION
 from vehnav.aiding.filter import Aids, Filtered
 from vehnav.aiding.kalman import adjoint_propagate, adjoint_update
 from vehnav.aiding.vehicle import SIZE
@@ -34,7 +35,10 @@ class Smoothed:
     ----------
     rows : (n, 22)
     parameters : (m, 15)
-    covariance : (m, 24, 24)
+    covariance : (m, 9, 9)
+        Of position, velocity and attitude.
+    parameter_sigmas : (15,)
+        At the last epoch.
     errors : (m, 24)
         Smoothed error of the filter's states, as taken off.
     """
@@ -42,6 +46,7 @@ class Smoothed:
     rows: Array
     parameters: Array
     covariance: Array
+    parameter_sigmas: Array
     errors: Array
 
 
@@ -57,8 +62,8 @@ def run_back(
     errors: Array,
     smoothed: Array,
 ) -> None:
-    """The loop back over the epochs: errors (m, n) and smoothed covariance (m, n, n)."""
-    n = covariance.shape[1]
+    """The loop back over the epochs: errors (m, n), smoothed covariance (m, 9, 9) of the first."""
+    n, few = covariance.shape[1], smoothed.shape[1]
     lam, big = np.zeros(n), np.zeros((n, n))
     work, vector = np.zeros((n, n)), np.zeros(n)
     for e in range(covariance.shape[0] - 1, -1, -1):
@@ -68,13 +73,13 @@ def run_back(
             for b in range(n):
                 total -= p[a, b] * lam[b]
             errors[e, a] = total
-        for a in range(n):  # work = P Lambda
+        for a in range(few):  # work = P Lambda
             for b in range(n):
                 total = 0.0
                 for c in range(n):
                     total += p[a, c] * big[c, b]
                 work[a, b] = total
-        for a in range(n):
+        for a in range(few):
             for b in range(a + 1):
                 total = p[a, b]
                 for c in range(n):
@@ -88,22 +93,36 @@ def run_back(
             adjoint_propagate(lam, big, phi[e], decay[e], work)
 
 
-def run_smoother(
-    increments: Increments, aids: Aids, forward: Filtered, *, earth: Ellipsoid
-) -> Smoothed:
-    """Run back over the epochs and take the smoothed errors off the filter's solution."""
-    m = aids.epochs.size
-    errors, covariance = np.zeros((m, SIZE)), np.zeros((m, SIZE, SIZE))
+def smoothed_errors(forward: Filtered) -> tuple[Array, Array]:
+    """Run back: errors (m, 24) of the filter's states, covariance (m, 9, 9) of what remains."""
+    m = forward.until.size
+    errors, covariance = np.zeros((m, SIZE)), np.zeros((m, NAVIGATION, NAVIGATION))
     run_back(
         forward.covariance, forward.phi, forward.decay, *forward.measurements, forward.until,
         errors, covariance,
     )  # fmt: skip
+    return errors, covariance
+
+
+def take_errors_off(
+    increments: Increments,
+    aids: Aids,
+    forward: Filtered,
+    errors: Array,
+    covariance: Array,
+    *,
+    earth: Ellipsoid,
+) -> Smoothed:
+    """The solution without the errors that :func:`smoothed_errors` found.
+
+    ``forward`` may have been relieved of its covariances (:meth:`Filtered.light`).
+    """
     rows, parameters = forward.rows.copy(), forward.parameters.copy()
-    after = np.ascontiguousarray(errors[:, :9])
+    after = np.ascontiguousarray(errors[:, :NAVIGATION])
     blend_corrections(
         np.require(increments.t, np.float64, ["C", "W"]), aids.epochs, rows, after,
         after + forward.fed_back, earth,
     )  # fmt: skip
     for par, x in zip(parameters, errors, strict=True):
         take_off_parameters(par, x)
-    return Smoothed(rows, parameters, covariance, errors)
+    return Smoothed(rows, parameters, covariance, forward.parameter_sigmas, errors)

@@ -36,15 +36,15 @@ def shaken_densities(t: Array, omega: Array, f: Array, at: Array) -> Array:
     at : (m,)
         s
     """
-    y = np.concatenate([omega, f], axis=1)
+    out = np.zeros((at.size, 6))
     if t.size < 4:
-        return np.zeros((at.size, 6))
-    bend = y[2:] - 2.0 * y[1:-1] + y[:-2]  # variance 6 of white noise of variance 1
+        return out
     step = float(np.median(np.diff(t)))
-    gathered = np.concatenate([np.zeros((1, 6)), np.cumsum(bend * bend, axis=0)])
-    first = np.searchsorted(t[1:-1], at - 0.5 * WINDOW)
-    last = np.searchsorted(t[1:-1], at + 0.5 * WINDOW)
-    first = np.minimum(first, bend.shape[0] - 1)
-    last = np.maximum(last, first + 1)
-    mean = (gathered[last] - gathered[first]) / (last - first)[:, None]
-    return np.asarray(mean / 6.0 * step)
+    first = np.minimum(np.searchsorted(t[1:-1], at - 0.5 * WINDOW), t.size - 3)
+    last = np.maximum(np.searchsorted(t[1:-1], at + 0.5 * WINDOW), first + 1)
+    for j in range(6):
+        y = omega[:, j] if j < 3 else f[:, j - 3]
+        bend = np.diff(y, 2)  # variance 6 of white noise of variance 1
+        gathered = np.concatenate([[0.0], np.cumsum(bend * bend)])
+        out[:, j] = (gathered[last] - gathered[first]) / (last - first) / 6.0 * step
+    return out
