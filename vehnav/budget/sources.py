@@ -5,7 +5,8 @@ Sensor errors in body axes (001, spec B 1.2)::
     d omega = b_g + (S_g + M_g) omega + G f + noise,    d f = b_a + (S_a + M_a) f + noise
 
 S diagonal, M off the diagonal. Initial errors are those of attitude, velocity and position in
-East-North-Up. Random processes have one sigma for the three axes of a triad.
+East-North-Up. Random processes have one sigma for the three axes of a triad. Counts, bandwidth and
+range are no linear sources; the Monte Carlo has them.
 """
 
 from __future__ import annotations
