@@ -186,7 +186,7 @@ shakes most the error of the pitch over 10 s follows its fastest vibration with 
 0.5, about each axis. Constraint: residuals of two GPS-aided drives have 0.03 to 0.1 m/s, correlated
 over seconds; 0.12 and 0.08 m/s at 10 Hz, with the shares of turning and speed, carry the
 information of such noise. Judged by the share of errors inside 1, 2, 3 sigma after GPS ends, at
-many times of two drives: 50, 87, 98 % (39, 86, 99 % wanted).
+many times of two drives: 53, 86, 96 %, smoothed 44, 80, 94 % (39, 86, 99 % wanted).
 """
 TACTICAL: Final = MEMS._replace(
     gyro=0.01 * DEG, accel=0.005, gyro_walk=9e-5 * DEG, accel_walk=5e-4, zero_rate=0.03 * DEG
