@@ -28,6 +28,8 @@ class Config:
     axes, accel_axes : str or None
         Letters (:mod:`vehnav.mounting`); ``auto`` or None: those that the format declares.
     mount : (roll, pitch, yaw), deg
+    accel_scale : float
+        What the accelerometer's numbers are multiplied with, e.g. of a calibration.
     start, end : float or None
         s from the start of the log.
     stamps : {"auto", "raw"}
@@ -85,6 +87,7 @@ class Config:
     axes: str | None = None
     accel_axes: str | None = None
     mount: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    accel_scale: float = 1.0
     start: float | None = None
     end: float | None = None
     stamps: Literal["auto", "raw"] = "auto"
@@ -121,6 +124,8 @@ class Config:
             raise ConfigError(f"--end {self.end:g} is not after --start {self.start:g}")
         if self.start_position is not None and abs(self.start_position[0]) > 90.0:
             raise ConfigError(f"--start-position: latitude {self.start_position[0]} is beyond 90")
+        if not 0.5 < self.accel_scale < 2.0:
+            raise ConfigError(f"--accel-scale {self.accel_scale:g}: a scale error is within 0.5..2")
         for name in ("max_gap", "gps_start_seconds"):
             if getattr(self, name) < 0.0:
                 raise ConfigError(f"--{name.replace('_', '-')} must not be negative")

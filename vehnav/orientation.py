@@ -35,17 +35,23 @@ class Declared:
         Letters; None: not said.
     mount : (roll, pitch, yaw)
         rad; zeros: not said.
+    accel_scale : float
+        What the numbers of the accelerometer are multiplied with.
     """
 
     axes: str | None = None
     accel_axes: str | None = None
     mount: Angles = (0.0, 0.0, 0.0)
+    accel_scale: float = 1.0
 
     @classmethod
-    def of_degrees(cls, axes: str | None, accel_axes: str | None, mount: Angles) -> Declared:
+    def of_degrees(
+        cls, axes: str | None, accel_axes: str | None, mount: Angles, accel_scale: float = 1.0
+    ) -> Declared:
         """From the options: ``auto`` says nothing, the mount is in degrees."""
         roll, pitch, yaw = (x * DEG for x in mount)
-        return cls(None if axes == "auto" else axes, accel_axes, (roll, pitch, yaw))
+        letters = None if axes == "auto" else axes
+        return cls(letters, accel_axes, (roll, pitch, yaw), accel_scale)
 
 
 @dataclass(frozen=True)

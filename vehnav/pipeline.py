@@ -288,7 +288,9 @@ def _samples(log: Log, config: Config) -> Samples:
         imu,
         path=log.path,
         start_ns=log.start_ns,
-        declared=Declared.of_degrees(config.axes, config.accel_axes, config.mount),
+        declared=Declared.of_degrees(
+            config.axes, config.accel_axes, config.mount, config.accel_scale
+        ),
         max_gap=config.max_gap,
         rule=stop_rule(config),
         gps=gps_between(

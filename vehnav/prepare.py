@@ -150,6 +150,8 @@ def prepare_samples(
     t: Array = np.asarray((imu.t_ns - start_ns) * NS, dtype=np.float64)
     gaps = _gap_findings(imu.t_ns, t, path, max_gap)
     imu, units, findings = in_si(imu, t, path=path, gps=gps)
+    if declared.accel_scale != 1.0:
+        imu = replace(imu, accel=imu.accel * declared.accel_scale)
     dt = np.diff(t, prepend=t[0] - imu.median_dt)[:, None]
     as_rates = imu.sampling == "rates"
     gyro, accel = (imu.gyro, imu.accel) if as_rates else (imu.gyro / dt, imu.accel / dt)

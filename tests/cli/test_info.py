@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,8 +13,14 @@ import pytest
 from click.testing import CliRunner, Result
 
 from tests.logs_for_tests import straight_log
+from tests.test_axes_auto import turned
+from vehnav import read_log
 from vehnav.cli.main import cli
+from vehnav.config import Config
+from vehnav.export.recording import write_recording
 from vehnav.mounting import sensor_to_body
+from vehnav.pipeline import search_stops
+from vehnav.simulate import simulate
 
 
 def vehnav(*args: object) -> Result:
@@ -118,6 +125,42 @@ def test_run_takes_the_calibration(drive, tmp_path) -> None:
     assert given["axes"] == "BRU"
     assert given["mount_deg"] == pytest.approx(saved["mount"], abs=1e-12)
     assert "axes-contradiction" not in [f["code"] for f in given["findings"]]
+
+
+def test_a_calibration_keeps_the_scale_of_the_accelerometer(tmp_path) -> None:
+    """A car whose accelerometer reads 2 % too much; the judge is the simulated specific force.
+
+    A second drive reads within 0.1 % of the truth, and so do its first 18 s, which have no
+    departure and by themselves show neither the axes nor the scale.
+    """
+
+    def logged(name: str, seed: int) -> tuple[Path, np.ndarray]:
+        log = simulate("city,duration=240,first_stop=20", seed=seed, rate_hz=50.0).log()
+        case = turned(log, "BRU")
+        assert log.imu is not None
+        assert case.imu is not None
+        imu = replace(case.imu, accel=1.02 * case.imu.accel, axes="RFU")  # as its names say
+        files = write_recording(replace(case, imu=imu), tmp_path / f"{name}.csv")
+        return files[0], log.imu.accel
+
+    car = tmp_path / "car.toml"
+    assert vehnav("info", logged("first", 3)[0], "--save-calibration", car).exit_code == 0
+    saved = tomllib.loads(car.read_text(encoding="utf-8"))["input"]
+    assert saved["accel_scale"] == pytest.approx(1.0 / 1.02, rel=1e-3)
+    second, truth = logged("second", 8)
+    log, given = read_log(str(second)), {**saved, "mount": tuple(saved["mount"])}
+    found, auto = search_stops(log, Config(**given)).samples, search_stops(log).samples
+    assert found.orientation.axes == auto.orientation.axes == "BRU"
+    short = search_stops(log, Config(**given, end=18.0)).samples
+    alone = search_stops(log, Config(end=18.0)).samples
+    assert not alone.orientation.evidence.certain
+    for samples in (found, short):
+        true = truth[: samples.t.size]
+        size = np.linalg.norm(samples.f, axis=1) / np.linalg.norm(true, axis=1)
+        assert np.median(size) == pytest.approx(1.0, abs=1e-3)
+        off = np.linalg.norm(samples.f - true, axis=1)
+        assert np.median(off) < 9.81 * np.radians(1.0)  # tilt of the mount
+    assert np.median(np.linalg.norm(alone.f, axis=1)) > 1.015 * 9.81
 
 
 @pytest.mark.parametrize(

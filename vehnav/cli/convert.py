@@ -60,6 +60,7 @@ def convert(
     axes: str | None,
     accel_axes: str | None,
     mount: tuple[float, float, float],
+    accel_scale: float,
     as_json: bool,
     strict: bool,
     quiet: bool,
@@ -81,6 +82,8 @@ def convert(
         from vehnav.logs.read import read_log
 
         log = read_log(source, read_options)
+        if log.imu is not None and accel_scale != 1.0:
+            log = replace(log, imu=replace(log.imu, accel=log.imu.accel * accel_scale))
         sensor = {"axes": axes, "accel_axes": accel_axes, "mount": mount}
         files, said = _convert_log(log, target, output_rate, sensor)
     findings: tuple[Finding, ...] = () if log is None else log.findings

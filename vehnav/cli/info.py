@@ -36,7 +36,8 @@ if TYPE_CHECKING:
 @click.argument("log")
 @click.option(
     "--save-calibration", metavar="FILE",
-    help="Write axes and mounting to a TOML file, for --calibration with other logs of this car.",
+    help="Write axes, mounting and scale to a TOML file, for --calibration with other logs of "
+    "this car.",
 )  # fmt: skip
 @input_options
 @span_options

@@ -166,7 +166,7 @@ def span_options(func: F) -> F:
     )  # fmt: skip
 
 
-_CALIBRATED = {"axes", "accel_axes", "mount"}
+_CALIBRATED = {"axes", "accel_axes", "mount", "accel_scale"}
 
 
 def _use_calibration(ctx: click.Context, param: click.Parameter, value: str | None) -> None:
@@ -178,21 +178,21 @@ def _use_calibration(ctx: click.Context, param: click.Parameter, value: str | No
     values = load_config(ctx, value)
     if not values or set(values) - _CALIBRATED:
         raise ConfigError(
-            f"{value}: not a calibration: expected [input] with axes, accel_axes and mount, as "
-            "'vehnav info LOG --save-calibration FILE' writes it"
+            f"{value}: not a calibration: expected [input] with axes, accel_axes, mount and "
+            "accel_scale, as 'vehnav info LOG --save-calibration FILE' writes it"
         )
     ctx.default_map = {**(ctx.default_map or {}), **values}
 
 
 def axes_options(func: F) -> F:
-    """``axes`` (letters, ``auto`` or None), ``accel_axes`` (letters or None), ``mount`` (deg)."""
+    """``axes`` (letters, ``auto`` or None), ``accel_axes``, ``mount`` (deg), ``accel_scale``."""
     return _apply(
         [
             click.option(
                 "--calibration", metavar="FILE", is_eager=True, expose_value=False,
                 callback=_use_calibration,
-                help="Axes and mounting of this car, as 'vehnav info --save-calibration' wrote "
-                "them; --axes, --accel-axes and --mount count more.",
+                help="Axes, mounting and scale of this car, as 'vehnav info --save-calibration' "
+                "wrote them; --axes, --accel-axes, --mount and --accel-scale count more.",
             ),
             option(
                 "input", "--axes", type=AxesType(auto=True),
@@ -207,6 +207,11 @@ def axes_options(func: F) -> F:
                 "input", "--mount", type=NumbersType("ROLL,PITCH,YAW"), default=(0.0, 0.0, 0.0),
                 help="Small attitude of the case that remains after --axes, deg: roll right side "
                 "down, pitch nose up, yaw clockwise.",
+            ),
+            option(
+                "input", "--accel-scale", type=NumberType(min=0, min_open=True), default=1.0,
+                metavar="FACTOR", show_default=True,
+                help="Multiply the accelerometer by this: gravity over its reading at rest.",
             ),
         ],
         func,

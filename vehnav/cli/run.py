@@ -53,7 +53,8 @@ class AidsType(ParamType):
 RESULTS = ("trajectory.csv", "report.json", "report.html")
 """What every run writes into its folder."""
 RUN_FIELDS = (
-    "axes", "accel_axes", "mount", "stamps", "max_gap", "split", "method", "as_published",
+    "axes", "accel_axes", "mount", "accel_scale", "stamps", "max_gap", "split", "method",
+    "as_published",
     "levelling", "reset", "causal", "frame", "coords", "vertical", "ellipsoid", "levelling_rate",
     "stop_threshold",
     "stop_statistic", "stop_window", "stop_dwell", "gps", "gps_start_seconds", "start_position",

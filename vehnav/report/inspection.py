@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from vehnav.config import Config
+from vehnav.earth import WGS84, normal_gravity
 from vehnav.errors import ConfigError, Finding, LogError
 from vehnav.evaluation.reference import path_distance
 from vehnav.evaluation.stop_score import score_stops
@@ -40,11 +41,14 @@ class Inspection:
         Stops, axes and units; None where the log cannot be navigated.
     problem : str
         Why not, or "".
+    accel_scale : float
+        By which the accelerometer was multiplied.
     """
 
     log: Log
     search: StopSearch | None
     problem: str
+    accel_scale: float = 1.0
 
     @property
     def orientation(self) -> Orientation | None:
@@ -71,7 +75,7 @@ def inspect_log(log: Log, config: Config) -> Inspection:
     problem = ""
     if not search.stops:
         problem = no_stop_advice(log.path, search)
-    return Inspection(log, search, problem)
+    return Inspection(log, search, problem, config.accel_scale)
 
 
 def document(inspection: Inspection) -> dict[str, Any]:
@@ -283,7 +287,10 @@ def _axes_lines(orientation: Orientation | None, imu: Imu | None) -> list[str]:
 
 
 def write_calibration(inspection: Inspection, path: Path) -> None:
-    """Axes and mounting in force as TOML, for other logs of the same car (``--calibration``).
+    """Axes, mounting and scale in force as TOML, for other logs of the car (``--calibration``).
+
+    The scale is gravity, at the place that GPS gives, over the force at rest. One attitude cannot
+    tell it from a bias along gravity; without a place or a stop it is left as it is.
 
     Raises
     ------
@@ -304,5 +311,15 @@ def write_calibration(inspection: Inspection, path: Path) -> None:
         lines.append(f'accel_axes = "{orientation.accel_axes}"')
     angles = ", ".join(repr(float(x / DEG)) for x in orientation.mount)
     lines.append(f"mount = [{angles}]  # roll, pitch, yaw, deg")
+    lines.append(f"accel_scale = {_accel_scale(inspection, orientation)!r}")
     with atomic_path(path) as temporary:
         temporary.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def _accel_scale(inspection: Inspection, orientation: Orientation) -> float:
+    """Gravity over the force at rest, with the scale already in force."""
+    gnss, rest = inspection.log.gnss, orientation.evidence.rest
+    if gnss is None or not gnss.t_ns.size or not rest.stops:
+        return inspection.accel_scale
+    gravity = normal_gravity(float(gnss.lat[0]), float(gnss.height[0]), WGS84)
+    return float(inspection.accel_scale * gravity / np.linalg.norm(rest.force))
