@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Final, Literal
 
 import numpy as np
@@ -144,8 +144,3 @@ def chosen_stops(drive: IdealDrive, every: float | None = None) -> tuple[tuple[f
             out.append((start, end))
             last = end
     return tuple(out)
-
-
-def without_stops(procedure: Procedure) -> Procedure:
-    """The same without corrections on the way."""
-    return replace(procedure, stops=())

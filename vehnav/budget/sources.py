@@ -12,7 +12,7 @@ range are no linear sources; the Monte Carlo has them.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Final, Literal
 
@@ -32,7 +32,6 @@ SENSOR_COLUMNS: Final = 33
 """Constant errors of the sensor, the nine g-sensitivities included; then nine initial errors."""
 COLUMNS: Final = SENSOR_COLUMNS + 9
 TILT: Final = slice(33, 35)
-HEADING: Final = 35
 
 
 @dataclass(frozen=True)
@@ -162,21 +161,3 @@ def constant_sigmas(sensor: Sensor, initial: Initial, *, levelled: bool, held: b
     if held:
         out[[38, 41]] = 0.0
     return out
-
-
-PARAMETERS: Final = tuple(dict.fromkeys([s.parameter for s in CONSTANT])) + (
-    "arw",
-    "vrw",
-    "gyro_walk",
-    "accel_walk",
-    "gyro_bias_instability",
-    "accel_bias_instability",
-)
-"""Every class of sources."""
-
-
-def check_initial(initial: Initial) -> None:
-    """ValueError for a negative sigma."""
-    for item in fields(initial):
-        if not getattr(initial, item.name) >= 0.0:
-            raise ValueError(f"initial {item.name} must not be negative")
