@@ -375,7 +375,8 @@ def _judge_all(
     except VehnavError:
         judged.clear()
     first_stop = int(trajectory.t_ns[np.argmax(trajectory.stopped)])
-    if first_stop > trajectory.t_ns[0] and gps.until_ns is not None:
+    asked = "units" in gps.used_for  # by fixes from the start of the log on
+    if first_stop > trajectory.t_ns[0] and gps.until_ns is not None and not asked:
         with suppress(VehnavError):
             judged["before"] = compare(trajectory, gnss, exclude=[(first_stop, 2**62)])
     return judged

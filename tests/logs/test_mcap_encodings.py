@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -506,3 +507,21 @@ def test_serialize_agrees_with_the_layout_of_a_ros_imu():
     data = serialize(store(), "sensor_msgs/msg/Imu", values)
     assert len(data) == 324
     assert np.frombuffer(data, "<f8", 3, 4 + 128).tolist() == [1.0, 2.0, 3.0]
+
+
+def test_numbers_written_as_text_are_numbers(tmp_path):
+    """Some drivers write the altitude as text: the same log as with numbers."""
+    d = drive()
+    channels = json_drive(d, schema=False)
+    plain = read(tmp_path, mcap(channels))
+    for k, channel in enumerate(channels):
+        if channel.topic == "/gps/fix":
+            rows = [(a, b, json.loads(text)) for a, b, text in channel.messages]
+            for _, _, row in rows:
+                row["altitude"], row["latitude"] = str(row["altitude"]), repr(row["latitude"])
+            texts = [(a, b, json.dumps(row).encode()) for a, b, row in rows]
+            channels[k] = replace(channel, messages=texts)
+    text = read(tmp_path, mcap(channels))
+    for name in ("t_ns", "lat", "lon", "height"):
+        np.testing.assert_array_equal(getattr(text.gnss, name), getattr(plain.gnss, name))
+    assert np.ptp(plain.gnss.height) > 0.0 or plain.gnss.height[0] != 0.0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Callable
 from functools import reduce
 from typing import TYPE_CHECKING, Any
@@ -123,7 +124,10 @@ class ObjectDecoder:
 
 def _numbers(value: Any, path: Path) -> list[float]:
     """A number, or a short list of numbers."""
-    if isinstance(value, int | float):
+    written = _written(value)
+    if written is not None:
+        values = [written]
+    elif isinstance(value, int | float):
         values = [value]
     elif isinstance(value, str | bytes | dict) or not hasattr(value, "__len__"):
         raise BadMessageError(f"its field {'.'.join(path)} is no number")
@@ -135,6 +139,17 @@ def _numbers(value: Any, path: Path) -> list[float]:
         if isinstance(number, int) and abs(number) >= MAX_COUNT:
             raise BadMessageError(f"its field {'.'.join(path)} is too large")
     return values
+
+
+def _written(value: Any) -> float | None:
+    """The number that a text is; some drivers write the altitude so. None for anything else."""
+    if not isinstance(value, str) or len(value) > 40 or "_" in value:
+        return None
+    try:
+        number = float(value)
+    except ValueError:
+        return None
+    return number if math.isfinite(number) else None
 
 
 # --- JSON ----------------------------------------------------------------------------------------
@@ -229,6 +244,7 @@ def _value_type(value: Any, name: str, depth: int) -> Type:
         element = _value_type(value[0], name, depth + 1) if value else Text()
         return Array(element, len(value))
     number = isinstance(value, int | float) and not isinstance(value, bool)
+    number = number or _written(value) is not None
     return Scalar("f8") if number else Text()
 
 
