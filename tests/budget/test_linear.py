@@ -220,6 +220,15 @@ def test_levelled_start_is_what_the_accelerometers_say():
     assert found.covariance[0, 0, 1, 1] == pytest.approx(window / 3.0)
 
 
+def test_readings_of_a_vehicle_at_rest_are_exact():
+    """The turn of the Earth and of the axes under gravity, to rounding."""
+    scenario = make_scenario("static", duration=5.0)
+    truth, ideal = ideal_log(scenario.motion, stamps(5.0, 100.0), sampling="increments")
+    found = drive_of_trajectory(truth, name="static").increments
+    np.testing.assert_allclose(found.dtheta, ideal.gyro[1:], rtol=0.0, atol=1e-13)
+    np.testing.assert_allclose(found.dvel, ideal.accel[1:], rtol=0.0, atol=1e-12)
+
+
 def test_readings_from_a_trajectory_are_those_of_the_simulator():
     scenario = make_scenario("city", duration=200.0)
     truth, ideal = ideal_log(scenario.motion, stamps(200.0, 100.0), sampling="increments")

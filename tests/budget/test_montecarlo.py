@@ -6,13 +6,17 @@ The quick versions take 40 runs, so three times sqrt(5) less sure.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from budget_drives import TOWN, drive
 
 from vehnav.budget import Budget, Initial, Procedure, processes_of, sensitivity
-from vehnav.budget.montecarlo import monte_carlo, stop_control
-from vehnav.sensors import load_sensor
+from vehnav.budget.montecarlo import _Experiment, monte_carlo, stop_control
+from vehnav.earth import position_difference
+from vehnav.sensors import Triad, load_sensor
+from vehnav.units import MILLI_G
 
 START = Initial(velocity=0.0, position=0.0)
 
@@ -68,6 +72,29 @@ def test_an_ideal_sensor_makes_no_error():
         ideal, load_sensor("ideal"), none, Procedure(stops=ideal.stops), at=(150.0,), runs=1
     )
     assert np.abs(found.errors).max() < 1e-6
+
+
+def test_a_levelled_start_balances_the_accelerometers():
+    ideal = drive("static", 60.0)
+    sensor = replace(load_sensor("ideal"), accel=Triad(bias=MILLI_G))
+    none = Initial(0.0, 0.0, 0.0, 0.0)
+    size = {
+        levelled: monte_carlo(
+            ideal, sensor, none, Procedure(levelled=levelled), at=(60.0,), runs=3
+        ).totals(60.0)["drms"]
+        for levelled in (False, True)
+    }
+    assert size[True] < 0.01 * size[False]
+
+
+def test_the_ideal_algorithm_keeps_to_the_drive():
+    """With the gyro bias of perfect gyros taken from the stops, which is none."""
+    ideal = drive(TOWN, 150.0).thinned(0.02)
+    procedure = Procedure(stops=ideal.stops, gyro_from_stops=True)
+    index = np.array([ideal.t.size - 1])
+    found = _Experiment(ideal, load_sensor("ideal"), START, procedure, index, False).positions(None)
+    off = position_difference(found[0, 0], found[0, 1], ideal.lat[-1], ideal.lon[-1])
+    assert np.hypot(*off) < 0.5
 
 
 def test_levels_settle_at_the_end_of_every_stop():
