@@ -11,7 +11,7 @@ import pytest
 from strapdown_motion import circle, exact, gamma, horizontal_error, radii, static
 
 from vehnav.earth import KRASOVSKY, WGS84, curvature_radii, normal_gravity
-from vehnav.rotation import c_nb_from_angles, skew
+from vehnav.rotation import c_from_rotvec, c_nb_from_angles, skew
 from vehnav.strapdown.langevin import F0, F, GravityInput, c_nb_of, integrate, state_vector
 from vehnav.strapdown.langevin_covariance import (
     gravity_slope,
@@ -244,6 +244,17 @@ def test_vertical_clamp_and_free():
     assert not y[:, [2, 5]].any()
     y = integrate(truth.t, measurements(truth), start(truth), vertical="free", hold="average")
     assert 0.0 < np.abs(y[:, 2]).max() < 0.1
+
+
+def test_tumbling_at_one_place_is_the_product_of_two_turns():
+    """No force, height held: C = exp(-omega_ie t) C_0 exp(omega_b t), every entry of it."""
+    lat, t = 0.8, np.arange(0.0, 2.0001, 0.005)
+    rate, c_nb = np.array([0.5, -0.8, 0.6]), c_nb_from_angles(0.7, 0.4, -0.3)
+    z = np.tile(np.concatenate([np.zeros(3), rate]), (t.size, 1))
+    y = integrate(t, z, state_vector([lat, 0.1, 0.0], np.zeros(3), c_nb))
+    earth_rate = KRASOVSKY.omega_ie * np.array([0.0, np.cos(lat), np.sin(lat)])
+    wanted = c_from_rotvec(-2.0 * earth_rate) @ c_nb @ c_from_rotvec(2.0 * rate)
+    assert np.max(np.abs(c_nb_of(y[-1]) - wanted)) < 1e-9
 
 
 def test_lengths_must_agree():
