@@ -1,8 +1,8 @@
 """The filter methods of a run: what GPS may do, the start, the filter, and how it is judged.
 
 ``--gps start``: fixes up to ``--gps-start-seconds`` after the first motion aid the filter, the
-later ones judge it. ``--gps aid``: all fixes aid but those that ``--outage`` cuts out, and the
-outages are judged one by one.
+later ones judge it. ``--gps aid``: all fixes aid but those that ``--outage`` cuts out, and only
+these judge it.
 """
 
 from __future__ import annotations
@@ -32,6 +32,8 @@ Array = npt.NDArray[np.float64]
 
 VETO_SPEED: Final = 1.0
 """m/s of GPS, in the median over a stop, that make it none (spec C 1)."""
+ALWAYS: Final = 2**62
+"""ns; no stamp is beyond it."""
 FEW_FIXES: Final = 3
 """Fixes below which GPS gives no start."""
 
@@ -47,8 +49,6 @@ class Aided:
         Those that GPS did not veto.
     alignment : Alignment
     gps : GpsUse
-    outages : tuple of (int, int)
-        ns, stretches whose fixes were cut out.
     result : LandResult
         Innovations, parameters, tuning.
     findings : tuple of Finding
@@ -58,7 +58,6 @@ class Aided:
     stops: list[Stop]
     alignment: Alignment
     gps: GpsUse
-    outages: tuple[tuple[int, int], ...]
     result: LandResult
     findings: tuple[Finding, ...]
 
@@ -121,29 +120,53 @@ def run_aided(
         result.outcome,
         drive.stops,
         _alignment(drive, t_ns, start, given, fixes),
-        _gps_use(fixes, until, config),
-        cut,
+        _gps_use(fixes, until, cut, config),
         result,
         tuple(vetoed + _findings(start, result, fixes, given)),
     )
 
 
-def judge_aided(trajectory: Trajectory, log: Log, aided: Aided, config: Config) -> Errors | None:
-    """Errors against GPS: after the start window; with ``--gps aid`` over all fixes."""
+def judge_aided(trajectory: Trajectory, log: Log, use: GpsUse) -> Errors | None:
+    """Errors against GPS by the fixes that aided nothing; None where too few are left."""
     if log.gnss is None:
         return None
-    since = aided.gps.until_ns if config.gps == "start" else None
     try:
         return compare(
             trajectory,
             log.gnss,
-            judge_from_ns=None if since is None else since + 1,
-            estimate_offset=config.gps != "aid",
-            outages=aided.outages,
+            judge_from_ns=None if use.until_ns is None else use.until_ns + 1,
+            exclude=_between(use.cut),
+            estimate_offset=not use.aids,
+            outages=use.cut or (),
             start_ns=log.start_ns,
         )
     except VehnavError:
         return None
+
+
+def agreement_with_gps(trajectory: Trajectory, log: Log, use: GpsUse) -> Errors | None:
+    """How far the track is from all fixes, those that aided among them: no error of the track."""
+    if log.gnss is None or not use.aids:
+        return None
+    try:
+        return compare(trajectory, log.gnss)
+    except VehnavError:
+        return None
+
+
+def _between(cut: tuple[tuple[int, int], ...] | None) -> list[tuple[int, int]]:
+    """The closed intervals outside those of ``cut``, which follow each other; ns."""
+    if cut is None:
+        return []
+    merged: list[tuple[int, int]] = []
+    for start, end in sorted(cut):
+        if merged and start <= merged[-1][1]:
+            merged[-1] = merged[-1][0], max(merged[-1][1], end)
+        else:
+            merged.append((start, end))
+    starts = [-ALWAYS, *(end + 1 for _, end in merged)]
+    ends = [*(start - 1 for start, _ in merged), ALWAYS]
+    return list(zip(starts, ends, strict=True))
 
 
 def outage_intervals(config: Config, start_ns: int, end_ns: int) -> tuple[tuple[int, int], ...]:
@@ -248,11 +271,15 @@ def _alignment(
     )
 
 
-def _gps_use(fixes: Fixes | None, until: int | None, config: Config) -> GpsUse:
+def _gps_use(
+    fixes: Fixes | None, until: int | None, cut: tuple[tuple[int, int], ...], config: Config
+) -> GpsUse:
     if fixes is None:
         return GpsUse()
-    used_for = ("position", "heading", "aiding")
-    return GpsUse(used_for, int(fixes.t.size), until, window_s=config.gps_start_seconds)
+    used_for, number = ("position", "heading", "aiding"), int(fixes.t.size)
+    if config.gps == "aid":
+        return GpsUse(used_for, number, cut=cut)
+    return GpsUse(used_for, number, until, window_s=config.gps_start_seconds)
 
 
 def _findings(

@@ -64,6 +64,9 @@ def with_axes(use: GpsUse, samples: Samples, gnss: Gnss | None) -> GpsUse:
     ):
         if until is None or gnss is None:
             continue
+        if use.aids:  # its fixes judge nothing already
+            use = replace(use, used_for=(*use.used_for, name))
+            continue
         start_ns = int(samples.t_ns[0]) - round(float(samples.t[0]) / NS)
         last = start_ns + int(np.ceil(until / NS)) + 1  # the fix itself, whatever the rounding
         known = use.until_ns if use.until_ns is not None else int(samples.t_ns[0]) - 1

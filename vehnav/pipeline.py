@@ -15,7 +15,7 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from vehnav.aided import judge_aided, outage_intervals, run_aided
+from vehnav.aided import agreement_with_gps, judge_aided, outage_intervals, run_aided
 from vehnav.choices import (
     METHODS,
     check_levelling_rate,
@@ -111,7 +111,7 @@ class Run:
     alignment : Alignment
     gps : GpsUse
     errors : Errors or None
-        After the GPS window; None without GPS or where no fix is left to judge.
+        By the fixes that the solution did not use; None where none is left to judge.
     errors_before : Errors or None
         Of the part before the first stop, which is integrated backward.
     method_errors : mapping of str to Errors
@@ -121,6 +121,9 @@ class Run:
     noise : LegNoise or None
         Noise figures from the log's rest that weighed the stops.
     findings : tuple of Finding
+    agreement : Errors or None
+        With ``--gps aid``: how far the track is from all fixes. Most of them aided, so this is no
+        error of the track.
     """
 
     log: Log
@@ -137,6 +140,7 @@ class Run:
     variants: Mapping[str, Trajectory]
     noise: LegNoise | None
     findings: tuple[Finding, ...]
+    agreement: Errors | None = None
 
     @property
     def axes(self) -> str:
@@ -210,13 +214,14 @@ def _run_filter(drive: Drive, log: Log, config: Config, samples: Samples) -> Run
     aided = run_aided(drive, samples.t_ns, log, config, given_start(config))
     aided = replace(aided, gps=with_axes(aided.gps, samples, log.gnss))
     trajectory = with_coordinates(_trajectory(aided.outcome, samples, aided.stops), config)
-    errors = judge_aided(trajectory, log, aided, config)
+    errors = judge_aided(trajectory, log, aided.gps)
+    agreement = agreement_with_gps(trajectory, log, aided.gps)
     findings = [*log.findings, *samples.findings, *aided.findings]
     findings += polar_findings(trajectory, config)
     findings += [] if errors is None else list(errors.findings)
     return Run(
         log, config, samples.orientation, trajectory, aided.stops, aided.outcome.records,
-        aided.alignment, aided.gps, errors, None, {}, {}, None, tuple(findings),
+        aided.alignment, aided.gps, errors, None, {}, {}, None, tuple(findings), agreement,
     )  # fmt: skip
 
 

@@ -82,12 +82,15 @@ class GpsUse:
     Attributes
     ----------
     used_for : tuple of str
-        ``position``, ``heading``.
+        ``position``, ``heading``, ``aiding``, ``axes``, ``units``, ``time offset``.
     fixes_used : int
     until_ns : int or None
         Fixes up to here judge nothing.
     window_s, window_path_m : float or None
         The stretch that gave the heading.
+    cut : tuple of (int, int) or None
+        Where fixes aid all the way: the outages in ns, both ends included. Their fixes judge, the
+        others judge nothing. None where ``until_ns`` tells.
     """
 
     used_for: tuple[str, ...] = ()
@@ -95,6 +98,12 @@ class GpsUse:
     until_ns: int | None = None
     window_s: float | None = None
     window_path_m: float | None = None
+    cut: tuple[tuple[int, int], ...] | None = None
+
+    @property
+    def aids(self) -> bool:
+        """Whether fixes aid all the way, not at the start alone."""
+        return self.cut is not None
 
 
 @dataclass(frozen=True)

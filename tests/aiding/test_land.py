@@ -54,6 +54,29 @@ def solutions(town):
     }
 
 
+def test_fixes_that_aided_judge_nothing(town, solutions):
+    found, fixes = solutions["aided"], town.log().gnss.t_ns
+    t = (fixes - found.start_ns) * NS
+    cut = fixes[(t >= 120.0) & (t <= 180.0)]
+    assert np.array_equal(found.errors.t_ns, cut)
+    assert found.gps.fixes_used + cut.size <= fixes.size
+    assert found.agreement.t_ns.size > 4 * cut.size
+    (outage,) = found.errors.outages
+    assert outage.max_m == found.errors.horizontal.max()
+
+
+def test_without_an_outage_nothing_judges_an_aided_run(town):
+    log = replace(town.log(), speed=None)
+    found = run(log, Config(method="filter", gps="aid"))
+    assert found.errors is None
+    assert np.median(found.agreement.horizontal) < 5.0  # GNSS noise of 1.5 m an axis
+    touching = ("100:130", "120:150")  # overlapping cuts leave one hole
+    found = run(log, Config(method="filter", gps="aid", outage=touching))
+    seconds = (found.errors.t_ns - found.start_ns) * NS
+    assert seconds.min() >= 100.0
+    assert seconds.max() <= 150.0
+
+
 def test_each_aid_makes_it_better(town, solutions):
     worst = {name: float(np.max(error_of(found, town))) for name, found in solutions.items()}
     assert worst["filter"] < 0.6 * worst["stops"]  # no side slip, forward only

@@ -195,6 +195,7 @@ def _gps(run: Run, start_ns: int) -> dict[str, Any]:
         "heading_window_s": use.window_s,
         "heading_window_path_m": use.window_path_m,
         "offset_s": run.log.gps_time_offset,
+        "agreement_m": _horizontal(run.agreement)["horizontal_m"],
     }
 
 
@@ -241,8 +242,8 @@ def errors_after_gaps(run: Run) -> tuple[Outage, ...]:
     )
 
 
-def _horizontal(errors: Errors) -> dict[str, Any]:
-    found = errors.statistics()["horizontal_m"]
+def _horizontal(errors: Errors | None) -> dict[str, Any]:
+    found = None if errors is None else errors.statistics()["horizontal_m"]
     return {"horizontal_m": None if found is None else found.to_dict()}
 
 

@@ -70,6 +70,9 @@ def error_panel(run: Run) -> Panel:
     curves = []
     judged = [errors for errors in (run.errors_before, run.errors) if errors is not None]
     own = [p for errors in judged for p in _over_time(run, errors, "", "").parts]
+    if run.agreement is not None:
+        name = "from all fixes, used or not"
+        curves.append(_over_time(run, run.agreement, name, "gps"))
     if own:
         curves.append(Curve(own_name(run), "ours", tuple(own)))
     for name, role in others(run, ("as_published", "free")):
@@ -101,7 +104,7 @@ def expected_band(x: Array, sigma_pos: Array) -> Band:
 def _error_top(curves: list[Curve], band: Band | None) -> float:
     """Top of the error axis: the own error whole, the others as far as it stays readable."""
     expected = 0.0 if band is None else float(band.high.max())
-    own = max((c.largest for c in curves if c.role == "ours"), default=expected)
+    own = max((c.largest for c in curves if c.role in ("ours", "gps")), default=expected)
     rest = [min(c.largest, READABLE * own) for c in curves if c.role == "published"]
     return ROOM * max([own, min(expected, EXPECTED * own), *rest, 1e-3])
 
@@ -124,7 +127,7 @@ def off_picture(curves: list[Curve], y_range: tuple[float, float], unit: str, x_
 
 def distance_panel(run: Run) -> Panel | None:
     """Horizontal error over the distance since GPS was last used."""
-    if run.errors is None or run.errors.distance[-1] < 1.0:
+    if run.errors is None or run.gps.aids or run.errors.distance[-1] < 1.0:
         return None
     errors = run.errors
     own = over_distance(log_seconds(run, errors.t_ns), errors, own_name(run), "ours")
@@ -157,7 +160,7 @@ def over_distance(t: Array, errors: Errors, name: str, role: str) -> Curve:
 
 def drift_panel(run: Run) -> Panel | None:
     """Growth of the error since the last correction, a line for each leg."""
-    if run.errors is None or run.errors.drift is None:
+    if run.errors is None or run.gps.aids or run.errors.drift is None:
         return None
     errors, found = run.errors, run.errors.drift
     t = log_seconds(run, errors.t_ns)[found.index]

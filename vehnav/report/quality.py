@@ -44,7 +44,7 @@ def methods_table(run: Run) -> str:
 
 def drift_table(run: Run) -> str:
     """Growth of the error after a time and after a distance since the last correction."""
-    if run.errors is None or run.errors.drift is None:
+    if run.errors is None or run.gps.aids or run.errors.drift is None:
         return ""
     found = run.errors.drift
     rows = [

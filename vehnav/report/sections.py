@@ -18,7 +18,7 @@ from vehnav.report.circle import radius_95
 from vehnav.report.markup import esc, table
 from vehnav.report.quality import inside_share
 from vehnav.report.scale import number
-from vehnav.report.summary import metres
+from vehnav.report.summary import in_outages, metres, rms_and_most
 
 Document = Mapping[str, Any]
 
@@ -29,7 +29,7 @@ SWITCHES: Final = {"levelling": "--no-levelling", "reset": "--no-reset"}
 def headline(run: Run) -> str:
     """The answer in one sentence."""
     if run.errors is not None:
-        return judged_sentence(run.errors, aided=gps_aids(run))
+        return judged_sentence(run.errors, aided=run.gps.aids)
     if run.errors_before is not None:
         before = run.errors_before.horizontal
         driven = float(run.errors_before.distance[-1] - run.errors_before.distance[0])
@@ -39,6 +39,8 @@ def headline(run: Run) -> str:
             "left to judge the rest"
         )
     path = metres(run.trajectory.path_length())
+    if run.gps.aids:
+        return f"{path} aided by GPS all the way; no fix is left to judge it"
     if run.log.gnss is None:
         return f"{path} by inertial sensors alone; the log has no GPS to compare with"
     if run.alignment.local:
@@ -51,25 +53,29 @@ def unbroken(text: str) -> str:
     return re.sub(r"(?<=\d) (?=k?m\b|%|s\b)", "\u00a0", text)
 
 
-def gps_aids(run: Run) -> bool:
-    """Whether GPS was used all the way, not for the start alone."""
-    return bool(run.gps.used_for) and run.gps.until_ns is None
-
-
 def judged_sentence(errors: Errors, *, aided: bool = False) -> str:
     """How far off at the end and at most; of an aided run, in the outages that it had."""
-    gaps = [o for o in errors.outages if o.max_m is not None]
-    if aided and gaps:
-        worst = max(o.max_m or 0.0 for o in gaps)
-        longest = max(o.length_s for o in gaps)
-        many = "1 outage" if len(gaps) == 1 else f"{len(gaps)} outages"
-        return f"At most {metres(worst)} from GPS in {many} of up to {longest:.0f} s"
+    if aided:
+        text = in_outages(errors)
+        return text[:1].upper() + text[1:]
     percent = errors.percent_of_distance()["end"]
     share = "" if percent is None else f" ({percent:.1f} %)"
     end, most = float(errors.horizontal[-1]), float(errors.horizontal.max())
     driven = metres(float(errors.distance[-1]))
-    text = f"Ended {metres(end)}{share} from GPS after {driven} with{'' if aided else 'out'} it"
+    text = f"Ended {metres(end)}{share} from GPS after {driven} without it"
     return text if most <= 1.005 * end else f"{text}; at most {metres(most)} on the way"
+
+
+def _aiding_sentence(run: Run) -> str:
+    text = f"GPS aids all the way: {run.gps.fixes_used} fixes, which judge nothing"
+    if run.errors is not None:
+        text += f"; the {run.errors.t_ns.size} inside the outages judge"
+    if run.agreement is None:
+        return text + "."
+    return (
+        f"{text}. From all fixes, used or not, the track is {rms_and_most(run.agreement)}; that is "
+        "no error figure."
+    )
 
 
 def gps_sentence(run: Run) -> str:
@@ -77,9 +83,8 @@ def gps_sentence(run: Run) -> str:
     use = run.gps
     if run.log.gnss is None:
         return "The log has no GPS."
-    if gps_aids(run):
-        judged = "" if run.errors is None else f"; {run.errors.t_ns.size} fixes judge"
-        return f"GPS aids all the way: {use.fixes_used} fixes, none inside an outage{judged}."
+    if use.aids:
+        return _aiding_sentence(run)
     if not use.used_for or use.until_ns is None:
         judges = run.errors is not None or run.errors_before is not None
         return "GPS was not used for the solution" + ("; it only judges." if judges else ".")

@@ -5,6 +5,9 @@ from __future__ import annotations
 import math
 from typing import Final
 
+import numpy as np
+
+from vehnav.evaluation import Errors
 from vehnav.orientation import Orientation
 from vehnav.pipeline import Run
 from vehnav.report.causes import causes_lines
@@ -32,19 +35,33 @@ def answer(run: Run) -> str:
     if run.errors is None:
         return _no_judge(run)
     errors = run.errors
+    if run.gps.aids:
+        return in_outages(errors)
     horizontal = errors.horizontal
     seconds = (errors.t_ns[-1] - errors.t_ns[0]) * NS
     percent = errors.percent_of_distance()["end"]
     share = "" if percent is None else f" ({percent:.1f} % of the distance)"
     return (
         f"{metres(float(horizontal[-1]))} off at the end{share}, {metres(float(horizontal.max()))} "
-        f"at most, over {metres(float(errors.distance[-1]))} and {seconds:.0f} s {_gps_word(run)}"
+        f"at most, over {metres(float(errors.distance[-1]))} and {seconds:.0f} s without GPS"
     )
 
 
-def _gps_word(run: Run) -> str:
-    """Whether the judged part had GPS."""
-    return "with GPS" if run.gps.used_for and run.gps.until_ns is None else "without GPS"
+def in_outages(errors: Errors) -> str:
+    """How far off where GPS was cut out.
+
+    The fixes that judge an aided run are those of its outages.
+    """
+    longest = max(outage.length_s for outage in errors.outages)
+    many = "1 outage" if len(errors.outages) == 1 else f"{len(errors.outages)} outages"
+    most = metres(float(errors.horizontal.max()))
+    return f"at most {most} from GPS in {many} of up to {longest:.0f} s"
+
+
+def rms_and_most(errors: Errors) -> str:
+    """Of the horizontal errors, in words."""
+    h = errors.horizontal
+    return f"{metres(float(np.sqrt(np.mean(h**2))))} rms, {metres(float(h.max()))} at most"
 
 
 def metres(value: float) -> str:
@@ -67,6 +84,8 @@ def metres(value: float) -> str:
 def _no_judge(run: Run) -> str:
     if run.log.gnss is None:
         return "no GPS in the log: nothing to judge the track by"
+    if run.gps.aids:
+        return "no GPS fix is left to judge the track: all aid it; --outage cuts some out"
     if run.errors_before is None:
         return "no GPS fix is left to judge the track: all were used for the start"
     before = run.errors_before.horizontal
@@ -125,8 +144,10 @@ def _start(run: Run) -> list[str]:
             f"up to {until:.1f} s; none of them judges"
         )
     elif use.used_for:
-        cut = "" if not run.config.outage else ", none in the outages"
-        lines.append(f"GPS        aids all the way: {use.fixes_used} fixes{cut}; all fixes judge")
+        cut = ", none in the outages" if use.cut else ""
+        lines.append(
+            f"GPS        aids all the way: {use.fixes_used} fixes{cut}; none of them judges"
+        )
     elif run.log.gnss is not None:
         lines.append("GPS        not used")
     return lines
@@ -170,7 +191,9 @@ def _answer(run: Run) -> list[str]:
     if run.errors is not None and run.errors.states.sigma_pos is not None:
         sigma = run.errors.states.sigma_pos[-1, :2]
         expected = float(radius_95(sigma))
-        lines.append(f"           expected {_gps_word(run)}: {metres(expected)} (95 %) at the end")
+        where = "at the end of the last outage" if run.gps.aids else "without GPS"
+        at_the_end = "" if run.gps.aids else " at the end"
+        lines.append(f"           expected {where}: {metres(expected)} (95 %){at_the_end}")
     elif run.trajectory.sigma_pos is not None:
         sigma = run.trajectory.sigma_pos[-1, :2]
         expected = float(radius_95(sigma))
@@ -182,4 +205,7 @@ def _answer(run: Run) -> list[str]:
                 f"{metres(row.distance_m)}: {metres(row.max_m)} at most, {metres(row.end_m)} at "
                 "the end"
             )
+    if run.agreement is not None:
+        words = rms_and_most(run.agreement)
+        lines.append(f"agreement  {words} from all fixes, used or not; no error figure")
     return lines
