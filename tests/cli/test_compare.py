@@ -13,7 +13,7 @@ from click.testing import CliRunner, Result
 from drives import Circle, trajectory_of
 
 from vehnav.cli.main import cli
-from vehnav.export import read_trajectory, write_trajectory
+from vehnav.export.formats import read_trajectory, write_trajectory
 
 
 def run(*args: object) -> Result:

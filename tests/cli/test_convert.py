@@ -11,7 +11,7 @@ from click.testing import CliRunner, Result
 from drives import Circle, gnss_of, trajectory_of
 
 from vehnav.cli.main import cli
-from vehnav.export import read_trajectory, write_trajectory
+from vehnav.export.formats import read_trajectory, write_trajectory
 from vehnav.logs.log import Gnss, Imu, Log, ReadOptions, Speed
 from vehnav.logs.read import read_log
 

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -65,3 +67,13 @@ def test_links_are_followed_and_devices_kept(tmp_path: Path) -> None:
 def test_a_folder_that_is_not_there(tmp_path: Path) -> None:
     with pytest.raises(FileNotFoundError), atomic_path(tmp_path / "none" / "a.csv") as temporary:
         temporary.write_text("x")
+
+
+def test_writing_whole_costs_no_format_and_no_compiler() -> None:
+    """Budgets, Allan tables and suites write whole files without reading any trajectory."""
+    program = (
+        "import sys; import vehnav.export.atomic; "
+        "print([m for m in sys.modules if m in ('numba', 'vehnav.export.formats')])"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
+    assert (done.stdout.strip(), done.stderr) == ("[]", "")

@@ -16,7 +16,7 @@ from pyproj import Transformer
 
 from vehnav.errors import ConfigError, FormatError, LogError
 from vehnav.evaluation import compare
-from vehnav.export import FORMATS, read_trajectory, write_trajectory
+from vehnav.export.formats import FORMATS, read_trajectory, write_trajectory
 from vehnav.export.thinning import keep_points
 from vehnav.rotation import angles_from_c_nb
 from vehnav.trajectory import Trajectory, interpolate_positions

@@ -16,7 +16,7 @@ from test_html import NASTY, Page
 from vehnav.cli.main import cli
 from vehnav.errors import ConfigError
 from vehnav.evaluation import compare
-from vehnav.export import write_trajectory
+from vehnav.export.formats import write_trajectory
 from vehnav.export.load import Track, as_trajectory
 from vehnav.report.comparison import Comparison, comparison, comparison_map, comparison_panels
 from vehnav.report.comparison_page import figure, headline, remark, render_comparison
