@@ -77,3 +77,13 @@ def test_writing_whole_costs_no_format_and_no_compiler() -> None:
     )
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
     assert (done.stdout.strip(), done.stderr) == ("[]", "")
+
+
+@pytest.mark.parametrize("write", [True, False])
+def test_what_cannot_be_written_is_named_as_it_was_asked_for(tmp_path: Path, write: bool) -> None:
+    target = tmp_path / "missing" / "a.csv"
+    with pytest.raises(FileNotFoundError) as caught, atomic_path(target) as temporary:
+        if write:
+            temporary.write_text("new")
+    assert caught.value.filename == str(target)
+    assert caught.value.strerror == "its folder does not exist"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import uuid
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 
@@ -15,7 +15,7 @@ def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
 
     The suffix is kept (writers choose the format by it) and a link is followed (the file it points
     to is replaced, not the link). A device or a pipe is written directly. OSError where the folder
-    does not exist or cannot be written.
+    does not exist or cannot be written; it names ``path``, not the other name.
 
     >>> import tempfile
     >>> folder = Path(tempfile.mkdtemp())
@@ -32,6 +32,10 @@ def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
     try:
         yield temporary
         temporary.replace(final)
-    except BaseException:
-        temporary.unlink(missing_ok=True)
+    except BaseException as error:
+        with suppress(OSError):
+            temporary.unlink()
+        if isinstance(error, OSError) and str(error.filename) == str(temporary):
+            reason = error.strerror if final.parent.is_dir() else "its folder does not exist"
+            raise OSError(error.errno, reason, os.fspath(path)) from error
         raise
