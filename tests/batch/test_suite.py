@@ -227,7 +227,8 @@ def test_sizes_and_shares() -> None:
     assert size_of(1000, "x") == 1000
     assert fraction_of("0.5 %", "x") == 0.005
     assert fraction_of(0, "x") == 0.0
-    for bad in ("-5%", "five", True):
+    assert fraction_of("200%", "x") == 2.0
+    for bad in ("-5%", "five", True, "5", 5):
         with pytest.raises(ConfigError):
             fraction_of(bad, "x")
 

@@ -127,8 +127,14 @@ def fraction_of(value: Any, where: str) -> float:
 
     >>> fraction_of("5%", "max_regression"), fraction_of(0.05, "max_regression")
     (0.05, 0.05)
+
+    A bare number from 1 on is refused: ``5`` means 5 % to most and would allow 500 %.
     """
     found = re.fullmatch(r"\s*(\d+(?:\.\d*)?|\.\d+)\s*(%?)\s*", str(value))
     if isinstance(value, bool) or found is None:
         raise ConfigError(f"{where}: expected a share such as 5% or 0.05, not {value!r}")
+    if not found[2] and float(found[1]) >= 1.0:
+        raise ConfigError(
+            f"{where}: {value!r} without a percent sign: write {value}% or a share such as 0.05"
+        )
     return float(found[1]) / (100.0 if found[2] else 1.0)
