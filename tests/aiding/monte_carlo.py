@@ -14,7 +14,7 @@ import numpy as np
 from vehnav.aiding.blocks import ROW, take_off
 from vehnav.aiding.filter import PARAMETERS, Aids, FilterStart, run_filter
 from vehnav.aiding.gaps import GapSigmas
-from vehnav.aiding.vehicle import ACCEL_SCALE, GYRO_SCALE, SIZE, TACTICAL, Prior
+from vehnav.aiding.vehicle import ACCEL_SCALE, CUT, GYRO_SCALE, SIZE, TACTICAL, Prior
 from vehnav.earth import WGS84, c_en, ecef_from_geodetic
 from vehnav.rotation import c_from_rotvec
 from vehnav.simulate import ideal_log, make_scenario, stamps
@@ -82,6 +82,7 @@ def prior_of(grade, **more):
         "tilt": 0.05 * DEG, "heading": 0.5 * DEG, "velocity": 0.05, "position": (1.0, 1.0, 1.0),
         "gyro": grade.gyro_bias, "accel": grade.accel_bias, "odometer": 0.0, "mount": 0.0,
         "lever": 0.0, "gyro_scale": 0.0, "accel_scale": 0.0, "slip": 0.0,
+        "cut": 0.0,
     }  # fmt: skip
     return Prior(**(known | more))
 
@@ -159,7 +160,8 @@ class Drawn:
 def draw(way, grade, prior, noise, rng, *, position=1.5, velocity=0.05):
     """Errors of one run; fixes at every second with noise in m and m/s per axis."""
     p0 = prior.covariance(noise)
-    x = rng.normal(size=SIZE) * np.sqrt(np.diag(p0))
+    x = np.zeros(SIZE)  # not shaken
+    x[:CUT] = rng.normal(size=CUT) * np.sqrt(np.diag(p0)[:CUT])
     dt = np.diff(way.t)[:, None]
     par = np.zeros(PARAMETERS)
     par[:6] = x[9:15]  # the filter starts with no bias known
@@ -175,6 +177,16 @@ def draw(way, grade, prior, noise, rng, *, position=1.5, velocity=0.05):
     fixes = draw_fixes(way, rng, position, velocity)
     increments = Increments(way.t, dtheta, dvel, np.zeros(way.t.size - 1, bool))
     return Drawn(increments, FilterStart(row, np.zeros(PARAMETERS), p0), par, fixes)
+
+
+def shake(way, drawn, aids, rng):
+    """Add lopsided vibration of 1 deg/s per axis, of which the gyro loses a drawn share."""
+    drawn.parameters[CUT - 9] = np.sqrt(drawn.start.covariance[CUT, CUT]) * rng.normal()
+    skewed = DEG * rng.normal(size=(aids.epochs.size, 3))
+    block = np.searchsorted(aids.epochs, np.arange(way.t.size - 1), side="right")
+    lost = drawn.parameters[CUT - 9] * skewed[np.minimum(block, aids.epochs.size - 1)]
+    drawn.increments.dtheta[:] += lost * np.diff(way.t)[:, None]
+    return replace(aids, skewed=skewed)
 
 
 def start_axes(way):
@@ -211,8 +223,10 @@ def aids_of(way, drawn, *, epoch=0.1, gnss=None, zupt=False, nhc=False, speed=No
     before = np.concatenate([[0], epochs[:-1]])
     still = count[epochs + 1] - count[before] == epochs - before + 1
     reading = np.full(epochs.size, np.nan) if speed is None else speed[epochs]
-    return Aids(epochs.astype(np.int64), still, zupt, False, nhc, reading, fix, drawn.fixes,
-                np.zeros(seconds.size), np.zeros((epochs.size, 6)))  # fmt: skip
+    return Aids(
+        epochs.astype(np.int64), still, zupt, False, nhc, reading, fix, drawn.fixes,
+        np.zeros(seconds.size), np.zeros((epochs.size, 6)), np.zeros((epochs.size, 3)),
+    )  # fmt: skip
 
 
 def filtered(drawn, aids, noise, *, absolute=False):

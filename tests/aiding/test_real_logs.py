@@ -45,10 +45,9 @@ def percent(found):
     [
         ("boston", "filter", 0.8, 0.5),
         ("boston", "smooth", 0.65, 0.5),
-        # one swerve of the pitch gyro at 145 s makes most of it; the end was wanted below 1.0
-        ("0708", "filter", 2.4, 1.6),
-        ("0708", "smooth", 1.7, 1.6),
-        ("0042", "filter", 0.5, 0.5),
+        ("0708", "filter", 1.8, 1.0),
+        ("0708", "smooth", 1.2, 1.0),
+        ("0042", "filter", 0.4, 0.4),
         ("0018", "filter", 1.3, 1.3),
     ],
 )
@@ -71,7 +70,7 @@ def test_outages_of_15_s(logs):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("name", "most"), [("boston", 2.7), ("0708", 2.7)])
+@pytest.mark.parametrize(("name", "most"), [("boston", 2.7), ("0708", 2.0)])
 def test_outages_of_60_s(logs, name, most):
     """Median of the maxima, smoothed, over two sets of outages."""
     log, axes = logs[name]
@@ -109,9 +108,9 @@ def inside(log, axes, reference, method, cuts):
 @pytest.mark.slow
 @pytest.mark.parametrize("method", ["filter", "smooth"])
 def test_share_of_real_errors_inside_the_circles(logs, method):
-    """Two drives, GPS that ends at many times: within 10 points of 86 and 99 % at 2 and 3 sigma.
+    """Two drives, GPS that ends at many times: 2 sigma within 8 points of 86 %, 3 sigma 5 of 99 %.
 
-    Inside 1 sigma there is too much (39 % wanted, 48 to 53 seen): most stretches are better than
+    Inside 1 sigma there is too much (39 % wanted, 46 to 54 seen): most stretches are better than
     their sigma, few much worse, as the shaking of a gyro comes and goes. The errors of one drive
     hang together over minutes, so a single stretch may be far off to either side.
     """
@@ -125,6 +124,6 @@ def test_share_of_real_errors_inside_the_circles(logs, method):
         ):
             shares.append(inside(log, axes, reference, method, cuts))
     one, two, three = np.mean(shares, axis=0)
-    assert one == pytest.approx(0.39, abs=0.15)
-    assert two == pytest.approx(0.86, abs=0.10)
-    assert three == pytest.approx(0.99, abs=0.10)
+    assert one == pytest.approx(0.39, abs=0.16)
+    assert two == pytest.approx(0.86, abs=0.08)
+    assert three == pytest.approx(0.99, abs=0.05)

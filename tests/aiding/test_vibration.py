@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from vehnav.aiding.vibration import shaken_densities
+from vehnav.aiding.vibration import shaken_densities, skewed_rates
 
 RATE = 100.0
 T = np.arange(0.0, 200.0, 1.0 / RATE)
@@ -42,3 +42,27 @@ def test_a_shaken_stretch_is_seen_where_it_is_and_on_its_axis():
 def test_few_samples_show_nothing():
     nothing = np.zeros((3, 3))
     assert not np.any(shaken_densities(T[:3], nothing, nothing, T[:2]))
+    assert not np.any(skewed_rates(T[:3], nothing, T[:2]))
+
+
+def test_skew_of_peaks_to_one_side_is_their_height():
+    """Mean cube over mean square of rare peaks: their height, with its sign; the mean is motion."""
+    omega = np.zeros((T.size, 3)) + [0.3, -0.2, 0.1]
+    omega[::50, 0] += 0.2
+    omega[::50, 1] -= 0.1
+    found = skewed_rates(T, omega, np.arange(5.0, 195.0))
+    # less its mean of n samples, 1 - 1/n and n - 1 times -1/n: 1 - 2/n, n 10 or 11
+    assert found[:, 0] == pytest.approx(0.2 * (1.0 - 2.0 / 10.5), rel=0.02)
+    assert found[:, 1] == pytest.approx(-0.1 * (1.0 - 2.0 / 10.5), rel=0.02)
+    assert np.max(np.abs(found[:, 2])) < 1e-9
+
+
+def test_skew_of_even_vibration_and_of_driving_is_nothing():
+    rng = np.random.default_rng(5)
+    even = 0.1 * rng.normal(size=(T.size, 3))
+    found = skewed_rates(T, even, np.arange(5.0, 195.0))
+    # third moment of 100 independent samples: sqrt(15 / 100) of the deviation, less the trend
+    assert np.sqrt(np.mean(found**2)) == pytest.approx(0.1 * np.sqrt(0.06), rel=0.5)
+    assert np.abs(found.mean()) < 0.1 * np.sqrt(0.15 / 570) * 3.0
+    turn = np.outer(0.25 * (1.0 - np.cos(0.5 * np.pi * T)), [0.0, 0.0, 1.0])
+    assert np.max(np.abs(skewed_rates(T, turn, T[100:-100:50]))) < 2e-3

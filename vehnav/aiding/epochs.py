@@ -20,7 +20,16 @@ from vehnav.aiding.measurements import (
     zero_rate,
     zero_velocity,
 )
-from vehnav.aiding.vehicle import ACCEL_SCALE, GYRO_SCALE, LIFT, MOUNT_PITCH, MOUNT_YAW, SIDE, Noise
+from vehnav.aiding.vehicle import (
+    ACCEL_SCALE,
+    CUT,
+    GYRO_SCALE,
+    LIFT,
+    MOUNT_PITCH,
+    MOUNT_YAW,
+    SIDE,
+    Noise,
+)
 from vehnav.earth import Ellipsoid
 from vehnav.kernel import kernel
 from vehnav.rotation import Mat3, Vec3, mat_vec
@@ -45,6 +54,7 @@ def predict(
     rate: Vec3,
     force: tuple[float, float],
     shaken: Array,
+    skewed: Vec3,
     dt: float,
     phi: Array,
     decay: Array,
@@ -56,7 +66,7 @@ def predict(
     """Covariance over an epoch of ``dt`` s around the state ``row``; writes Phi and decay too.
 
     ``rate`` (rad/s) and ``force`` (right and forward, m/s2): means over the epoch, body axes;
-    ``shaken`` (6,): :func:`vehnav.aiding.vibration.shaken_densities`.
+    ``shaken`` (6,) and ``skewed``: those of :mod:`vehnav.aiding.vibration`.
     """
     f = work[:9]
     f[:, :] = 0.0
@@ -67,6 +77,7 @@ def predict(
     for a in range(9):
         f[a, GYRO_SCALE] = -rate[2] * f[a, 14]
         f[a, ACCEL_SCALE] = -force[1] * f[a, 10]
+        f[a, CUT] = -(skewed[0] * f[a, 12] + skewed[1] * f[a, 13] + skewed[2] * f[a, 14])
     g = f[:, 9:15].copy()
     transition_rows(f, dt, phi)
     kept = np.exp(-dt / noise.slow_time)

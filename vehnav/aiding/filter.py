@@ -55,6 +55,8 @@ class Aids:
         s by which the fix is older than its epoch.
     shaken : (m, 6)
         :func:`vehnav.aiding.vibration.shaken_densities` at the epochs.
+    skewed : (m, 3)
+        :func:`vehnav.aiding.vibration.skewed_rates` at the epochs; zero where the vehicle stands.
     """
 
     epochs: IntArray
@@ -67,6 +69,7 @@ class Aids:
     fixes: Array
     ago: Array
     shaken: Array
+    skewed: Array
 
 
 @dataclass(frozen=True)
@@ -77,9 +80,9 @@ class FilterStart:
     ----------
     row : (22,)
         Navigation row.
-    parameters : (15,)
+    parameters : (16,)
         Parameter row.
-    covariance : (24, 24)
+    covariance : (25, 25)
     """
 
     row: Array
@@ -112,15 +115,15 @@ class Filtered:
     ----------
     rows : (n, 22)
         Navigation rows at all instants from the first epoch on; at an epoch after feedback.
-    parameters : (m, 15)
+    parameters : (m, 16)
         At the epochs, after feedback.
-    covariance : (m, 24, 24)
+    covariance : (m, 25, 25)
         At the epochs, after feedback.
     fed_back : (m, 9)
         Navigation errors that were taken off at the epochs.
-    phi : (m, 9, 24), decay : (m, 24)
+    phi : (m, 9, 25), decay : (m, 25)
         Transition over the block before each epoch.
-    measurements : (rows (u, 24), gains (u, 24), (innovation, variance) (u, 2))
+    measurements : (rows (u, 25), gains (u, 25), (innovation, variance) (u, 2))
     until : (m,) int64
         Number of measurements applied up to and with each epoch.
     innovations : dict of str to Innovations
@@ -138,7 +141,7 @@ class Filtered:
 
     @property
     def parameter_sigmas(self) -> Array:
-        """(15,) at the last epoch, where a smoother has nothing to add."""
+        """(16,) at the last epoch, where a smoother has nothing to add."""
         return np.asarray(np.sqrt(np.diagonal(self.covariance[-1]))[9:])
 
     def light(self) -> Filtered:
@@ -186,6 +189,7 @@ def run_epochs(
     fixes: Array,
     ago: Array,
     shaken: Array,
+    skewed: Array,
     noise: Noise,
     absolute: bool,
     earth: Ellipsoid,
@@ -202,20 +206,24 @@ def run_epochs(
     """The loop over epochs; outputs of the first epoch hold the start."""
     t, dtheta, dvel, coast = imu
     p = covariance[0].copy()
-    par = parameters[0].copy()
+    par, now = parameters[0].copy(), parameters[0].copy()
     x, h, work = np.zeros(SIZE), np.zeros(SIZE), np.zeros((SIZE, SIZE))
     for e in range(epochs.shape[0]):
         b = epochs[e]
         rate = (0.0, 0.0, 0.0)
         if e > 0:
             a = epochs[e - 1]
-            run_block(t, dtheta, dvel, coast, a, b, rows, par, absolute, earth)
-            rate = mean_rate(t, dtheta, a, b, par)
+            skew = (skewed[e, 0], skewed[e, 1], skewed[e, 2])
+            now[:] = par
+            for j in range(3):
+                now[3 + j] += par[15] * skew[j]
+            run_block(t, dtheta, dvel, coast, a, b, rows, now, absolute, earth)
+            rate = mean_rate(t, dtheta, a, b, now)
             dt = t[b] - t[a]
             force = mean_force(t, dvel, a, b)
             predict(
-                p, rows[(a + b) // 2], rate, force, shaken[e], dt, phi[e], decay[e], work, noise,
-                absolute, earth,
+                p, rows[(a + b) // 2], rate, force, shaken[e], skew, dt, phi[e], decay[e], work,
+                noise, absolute, earth,
             )  # fmt: skip
             par[12] *= decay[e, 21]
             par[13] *= decay[e, 22]
@@ -284,8 +292,8 @@ def run_filter(
          np.require(increments.coast, np.bool_, ["C", "W"])),
         _ready(gaps.attitude), _ready(gaps.velocity),
         aids.epochs, aids.stopped, (aids.zupt, aids.zaru, aids.nhc), aids.speed, aids.fix,
-        aids.fixes, aids.ago, aids.shaken, noise, absolute, earth, rows, parameters, covariance,
-        fed_back, phi, decay, kept, until, counts,
+        aids.fixes, aids.ago, aids.shaken, aids.skewed, noise, absolute, earth, rows, parameters,
+        covariance, fed_back, phi, decay, kept, until, counts,
     )  # fmt: skip
     u = int(kept[3][0])
     return Filtered(

@@ -22,7 +22,7 @@ from vehnav.aiding.fixes import Fixes
 from vehnav.aiding.gaps import bridge_gaps
 from vehnav.aiding.smoother import Smoothed, smoothed_errors, take_errors_off
 from vehnav.aiding.vehicle import MEMS, TACTICAL, Noise, Prior
-from vehnav.aiding.vibration import shaken_densities
+from vehnav.aiding.vibration import shaken_densities, skewed_rates
 from vehnav.classic import Drive, Outcome, StopRecord
 from vehnav.rest import TimeIntegral, white_noise
 from vehnav.stops import stopped_mask
@@ -91,9 +91,9 @@ class LandResult:
     ----------
     outcome : Outcome
     innovations : dict of str to Innovations
-    parameters : (15,)
+    parameters : (16,)
         Last estimate of the parameter row.
-    parameter_sigmas : (15,)
+    parameter_sigmas : (16,)
     tuning : Tuning
     """
 
@@ -210,7 +210,10 @@ def put_to_epochs(
     table = np.zeros((0, 13)) if inside is None else inside.table(drive.earth)
     ago = np.zeros(0) if inside is None else t[at_fix] - inside.t
     shaken = shaken_densities(drive.t, drive.omega, drive.f, t[epochs])
-    return Aids(epochs, still, use.zupt, use.zaru, use.nhc, reading, fix, table, ago, shaken)
+    skewed = skewed_rates(drive.t, drive.omega, t[epochs]) * ~still[:, None]
+    return Aids(
+        epochs, still, use.zupt, use.zaru, use.nhc, reading, fix, table, ago, shaken, skewed
+    )
 
 
 def _readings(t: Array, speed: tuple[Array, Array] | None) -> Array:

@@ -9,7 +9,9 @@ body axes right-forward-up, at the sensor, with the speed v along the body's for
 mu, p: the direction of travel lies to the right and above of the forward axis of the body frame as
 it was mounted; l: the sensor sits in front of the axle that does not slide; k: tyre slip; n: what
 remains, correlated in time, a first-order Gauss-Markov process each. The odometer reads
-``(1 + kappa) v``. As everywhere the error states are estimate minus truth.
+``(1 + kappa) v``. The gyro reads, besides its biases, ``c s`` about each axis, s the skew of its
+vibration (:mod:`vehnav.aiding.vibration`) and c the share that it loses of it (negative). As
+everywhere the error states are estimate minus truth.
 """
 
 from __future__ import annotations
@@ -33,9 +35,10 @@ SLIP: Final = 20
 SIDE: Final = 21
 LIFT: Final = 22
 ACCEL_SCALE: Final = 23
-SIZE: Final = 24
-"""Number of states: 15 of the error model, kappa, mu, p, l, gyro z scale, k, n_side, n_up, and the
-scale of the forward accelerometer."""
+CUT: Final = 24
+SIZE: Final = 25
+"""Number of states: 15 of the error model, kappa, mu, p, l, gyro z scale, k, n_side, n_up, the
+scale of the forward accelerometer, and the share that the gyro loses of lopsided vibration."""
 
 
 class Noise(NamedTuple):
@@ -114,8 +117,8 @@ class Prior:
         m, wander axes.
     gyro, accel : float
         rad/s, m/s2, of the biases that remain.
-    odometer, mount, lever, gyro_scale, accel_scale, slip : float
-        1, rad, m, 1, 1, s2/m.
+    odometer, mount, lever, gyro_scale, accel_scale, slip, cut : float
+        1, rad, m, 1, 1, s2/m, 1.
     """
 
     tilt: float
@@ -130,9 +133,10 @@ class Prior:
     gyro_scale: float = 0.005
     accel_scale: float = 0.02
     slip: float = 0.004
+    cut: float = 0.15
 
     def covariance(self, noise: Noise) -> Array:
-        """P (24, 24) at the start."""
+        """P (25, 25) at the start."""
         sigma = np.array(
             [
                 *self.position,
@@ -151,6 +155,7 @@ class Prior:
                 noise.side_slow,
                 noise.up_slow,
                 self.accel_scale,
+                self.cut,
             ]
         )
         return np.asarray(np.diag(sigma**2))
@@ -160,7 +165,7 @@ MEMS: Final = Noise(
     gyro=0.02 * DEG,
     accel=0.01,
     accel_share=0.025,
-    gyro_shaken=0.25,
+    gyro_shaken=0.18,
     accel_shaken=1.0,
     gyro_walk=9e-4 * DEG,
     accel_walk=1.5e-3,
@@ -183,10 +188,11 @@ MEMS: Final = Noise(
 
 Gyro, accelerometer and bias walks: spec C section 4. Shares of vibration: on the car whose gyro
 shakes most the error of the pitch over 10 s follows its fastest vibration with a factor of 0.2 to
-0.5, about each axis. Constraint: residuals of two GPS-aided drives have 0.03 to 0.1 m/s, correlated
-over seconds; 0.12 and 0.08 m/s at 10 Hz, with the shares of turning and speed, carry the
-information of such noise. Judged by the share of errors inside 1, 2, 3 sigma after GPS ends, at
-many times of two drives: 53, 86, 96 %, smoothed 44, 80, 94 % (39, 86, 99 % wanted).
+0.5, about each axis, of whose square half is found by its skew. Constraint: residuals of two
+GPS-aided drives have 0.03 to 0.1 m/s, correlated over seconds; 0.12 and 0.08 m/s at 10 Hz, with the
+shares of turning and speed, carry the information of such noise. Judged by the share of errors
+inside 1, 2, 3 sigma after GPS ends, at many times of two drives: 54, 91, 99 %, smoothed 46, 85,
+97 % (39, 86, 99 % wanted).
 """
 TACTICAL: Final = MEMS._replace(
     gyro=0.01 * DEG, accel=0.005, gyro_walk=9e-5 * DEG, accel_walk=5e-4, zero_rate=0.03 * DEG
