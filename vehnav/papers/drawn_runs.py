@@ -20,7 +20,7 @@ from vehnav.aiding.fixes import Fixes
 from vehnav.aiding.gaps import GapSigmas
 from vehnav.aiding.gnss_forms import Form
 from vehnav.aiding.land import Use, put_to_epochs
-from vehnav.aiding.vehicle import SIZE, Noise, Prior
+from vehnav.aiding.vehicle import CUT, SIZE, Noise, Prior
 from vehnav.classic import Drive
 from vehnav.earth import WGS84, c_en, ecef_from_geodetic, geodetic_from_ecef
 from vehnav.simulate.generate import ideal_log, stamps
@@ -91,11 +91,11 @@ def noise() -> Noise:
 
 
 def prior() -> Array:
-    """P (24, 24): 1 m, 0.05 m/s, 0.05 deg, 0.5 deg of heading and the biases; no vehicle."""
+    """P (25, 25): 1 m, 0.05 m/s, 0.05 deg, 0.5 deg of heading and the biases; no vehicle."""
     known = Prior(
         tilt=0.05 * DEG, heading=0.5 * DEG, velocity=0.05, position=(1.0, 1.0, 1.0),
         gyro=GYRO_BIAS, accel=ACCEL_BIAS, odometer=0.0, mount=0.0, lever=0.0, gyro_scale=0.0,
-        accel_scale=0.0, slip=0.0,
+        accel_scale=0.0, slip=0.0, cut=0.0,
     )  # fmt: skip
     return known.covariance(noise())
 
@@ -104,7 +104,8 @@ def draw_run(way: Way, form: Form, seed: int) -> Judged:
     """Draw the errors, filter with fixes in a form, look at the errors."""
     rng = np.random.default_rng([3, seed])
     p = prior()
-    x = rng.standard_normal(SIZE) * np.sqrt(np.diag(p))
+    x = np.zeros(SIZE)  # not shaken
+    x[:CUT] = rng.standard_normal(CUT) * np.sqrt(np.diag(p)[:CUT])
     dt = np.diff(way.t)[:, None]
     shape = way.dtheta.shape
     dtheta = way.dtheta + x[GYRO] * dt + GYRO_NOISE * np.sqrt(dt) * rng.standard_normal(shape)
