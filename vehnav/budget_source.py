@@ -24,17 +24,17 @@ SHORT: Final = {"T": "duration"}
 """Names of parameters as spec B has them -> the simulator's."""
 
 
-def scenario_drive(text: str) -> IdealDrive:
+def scenario_drive(text: str, *, rate_hz: float = RATE_HZ) -> IdealDrive:
     """``town,duration=900,v=12`` (or with ``T=900``): the simulator's exact readings and states.
 
-    ConfigError for an unknown scenario or parameter.
+    ``rate_hz``: of the readings. ConfigError for an unknown scenario or parameter.
     """
     name, *pairs = text.split(",")
     named = [
         f"{SHORT.get(k.strip(), k.strip())}={v}" for k, _, v in (p.partition("=") for p in pairs)
     ]
     motion = make_scenario(",".join([name, *named])).motion
-    truth, ideal = ideal_log(motion, stamps(motion.duration, RATE_HZ), sampling="increments")
+    truth, ideal = ideal_log(motion, stamps(motion.duration, rate_hz), sampling="increments")
     t = (truth.t_ns - truth.t_ns[0]) * NS
     return IdealDrive(
         name=text,

@@ -93,7 +93,7 @@ def test_log_row_sees_the_total_velocity_error(monkeypatch):
         c = row[13:].reshape(3, 3)
         row[13:] = (c_from_rotvec(np.array(x[6:9])) @ c).ravel()
 
-    monkeypatch.setattr(paper003, "take_off", turn_attitude_only)
+    monkeypatch.setattr(paper003, "displace", turn_attitude_only)
     assert paper003._log_model().verdict == "not reproduced"
 
 

@@ -13,7 +13,7 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from vehnav.aiding.blocks import ROW, take_off
+from vehnav.aiding.blocks import ROW
 from vehnav.aiding.error_model import ACCEL, GYRO, PAPER_STATES
 from vehnav.aiding.filter import PARAMETERS, Filtered, FilterStart, run_filter
 from vehnav.aiding.fixes import Fixes
@@ -23,6 +23,7 @@ from vehnav.aiding.land import Use, put_to_epochs
 from vehnav.aiding.vehicle import CUT, SIZE, Noise, Prior
 from vehnav.classic import Drive
 from vehnav.earth import WGS84, c_en, ecef_from_geodetic, geodetic_from_ecef
+from vehnav.papers.displaced import displace
 from vehnav.simulate.generate import ideal_log, stamps
 from vehnav.simulate.scenarios import make_scenario
 from vehnav.strapdown.increments import Increments
@@ -113,7 +114,7 @@ def draw_run(way: Way, form: Form, seed: int) -> Judged:
     increments = Increments(way.t, dtheta, dvel, np.zeros(way.t.size - 1, np.bool_))
     first = way.truth.rows(slice(0, 1))
     (row,) = true_rows(first, np.swapaxes(c_en(first.lat, first.lon), 1, 2).reshape(-1, 9))
-    take_off(row, -x[:9], WGS84)
+    displace(row, -x[:9], WGS84)
     rates = np.zeros((way.t.size, 3))
     drive = Drive(way.t, rates, rates, increments, [], WGS84)
     standing = np.zeros(way.t.size, np.bool_)

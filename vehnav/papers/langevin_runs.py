@@ -13,7 +13,6 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from vehnav.aiding.blocks import take_off
 from vehnav.aiding.filter import PARAMETERS, FilterStart, run_filter
 from vehnav.aiding.fixes import Fixes
 from vehnav.aiding.gaps import GapSigmas
@@ -22,6 +21,7 @@ from vehnav.aiding.langevin_filter import filter_langevin, navigation_covariance
 from vehnav.aiding.vehicle import SIZE, Noise
 from vehnav.classic import Drive
 from vehnav.earth import WGS84, c_en, ecef_from_geodetic, geodetic_from_ecef, position_difference
+from vehnav.papers.displaced import displace
 from vehnav.papers.drawn_runs import OFF, Way, navigation_errors, true_rows
 from vehnav.rotation import rotvec_from_c
 from vehnav.strapdown.increments import Increments
@@ -100,7 +100,7 @@ def draw_log(way: Way, heading_sigma: float, seed: int) -> DrawnLog:
     sigmas = np.append(START, heading_sigma)
     first = way.truth.rows(slice(0, 1))
     (row,) = true_rows(first, np.swapaxes(c_en(first.lat, first.lon), 1, 2).reshape(-1, 9))
-    take_off(row, -sigmas * rng.standard_normal(9), WGS84)
+    displace(row, -sigmas * rng.standard_normal(9), WGS84)
     at = np.searchsorted(way.t, np.arange(1.0, way.t[-1] + 1e-6) - 1e-6)
     truth = way.truth.rows(at)
     r_e = ecef_from_geodetic(truth.lat, truth.lon, truth.height)
