@@ -40,6 +40,7 @@ from pathlib import Path
 from typing import Any, Final, Literal
 
 from vehnav.batch.fields import check_keys, fraction_of, hints, nearest, size_of, value_of
+from vehnav.batch.metric_paths import check_metric
 from vehnav.batch.model import METRICS, Bound
 from vehnav.batch.options import check_options, config_options, run_options
 from vehnav.batch.places import beside, expanded, find_places, folder_name
@@ -360,6 +361,7 @@ def _bar(table: Mapping[str, Any], where: str) -> Bar:
             f"{where} metric: expected a dotted path of report.json such as "
             f"errors.horizontal_m.max, not {metric!r}"
         )
+    check_metric(metric, f"{where} metric")
     return Bar(metric, bound, value_of(table[bound], float, f"{where} {bound}"), **scope)
 
 

@@ -1,0 +1,53 @@
+"""The metric of a bar: its dotted path against the schema of ``report.json``."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cache
+from typing import Any
+
+from vehnav.batch.fields import nearest
+from vehnav.errors import ConfigError
+
+
+@cache
+def _schema() -> dict[str, Any]:
+    from vehnav.report.document import schema
+
+    return schema()
+
+
+def check_metric(metric: str, where: str) -> None:
+    """ConfigError, with the nearest name, for a path that no report can have.
+
+    A step is refused only where the schema names all that there is (``additionalProperties``
+    false); ``findings.CODE`` and what is below a list are taken as they are.
+
+    >>> check_metric("errors.horizontal_m.max", "bar")
+    >>> check_metric("errors.horizontal_m.maxx", "bar")
+    Traceback (most recent call last):
+    ...
+    vehnav.errors.ConfigError: bar: no figure 'errors.horizontal_m.maxx'; did you mean 'max'?
+    """
+    steps = metric.split(".")
+    if steps[0] == "findings":
+        return
+    node = _schema()
+    for step in steps:
+        named = node.get("properties", {})
+        others = node.get("additionalProperties", True)
+        if step not in named and others is False:
+            raise ConfigError(f"{where}: no figure {metric!r}{nearest(step, named)}")
+        node = _resolved(named.get(step, others))
+
+
+def _resolved(node: Any) -> dict[str, Any]:
+    """The part of the schema that a node stands for: references followed, null left out."""
+    if not isinstance(node, Mapping):
+        return {}
+    if "$ref" in node:
+        return _resolved(_schema()["$defs"][node["$ref"].rpartition("/")[2]])
+    for choice in node.get("anyOf", ()):
+        if choice.get("type") != "null":
+            return _resolved(choice)
+    return dict(node)
