@@ -20,8 +20,6 @@ if TYPE_CHECKING:
 SCENARIO: Final = "scenario:"
 RATE_HZ: Final = 100.0
 """Of the readings on a scenario."""
-SHORT: Final = {"T": "duration"}
-"""Names of parameters as spec B has them -> the simulator's."""
 
 
 def scenario_drive(text: str, *, rate_hz: float = RATE_HZ) -> IdealDrive:
@@ -29,11 +27,7 @@ def scenario_drive(text: str, *, rate_hz: float = RATE_HZ) -> IdealDrive:
 
     ``rate_hz``: of the readings. ConfigError for an unknown scenario or parameter.
     """
-    name, *pairs = text.split(",")
-    named = [
-        f"{SHORT.get(k.strip(), k.strip())}={v}" for k, _, v in (p.partition("=") for p in pairs)
-    ]
-    motion = make_scenario(",".join([name, *named])).motion
+    motion = make_scenario(text).motion
     truth, ideal = ideal_log(motion, stamps(motion.duration, rate_hz), sampling="increments")
     t = (truth.t_ns - truth.t_ns[0]) * NS
     return IdealDrive(

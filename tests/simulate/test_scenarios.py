@@ -216,3 +216,7 @@ def test_every_seed_fills_its_duration(duration):
         assert motion.duration == pytest.approx(duration, abs=1e-6)
         motion = make_scenario("motorway", duration=duration + 100.0, seed=seed, road=0.0).motion
         assert motion.duration == pytest.approx(duration + 100.0, abs=1e-6)
+
+
+def test_t_is_the_duration_on_every_command() -> None:
+    assert make_scenario("town,T=150").motion.duration == 150.0

@@ -51,6 +51,10 @@ SCENARIOS: Final[Mapping[str, Callable[..., Motion]]] = MappingProxyType(
 """Name -> function that makes the motion; its keywords are the parameters."""
 
 
+SHORT: Final[Mapping[str, str]] = MappingProxyType({"T": "duration"})
+"""Short names of parameters."""
+
+
 def scenario_parameters(name: str) -> dict[str, Any]:
     """Parameter -> default of a scenario; ConfigError when there is no such scenario."""
     if name not in SCENARIOS:
@@ -64,8 +68,8 @@ def scenario_parameters(name: str) -> dict[str, Any]:
 def make_scenario(text: str, **more: Any) -> Scenario:
     """The scenario of ``NAME[,KEY=VALUE...]``; ``more`` overrides what the text says.
 
-    The name of a GPX, GeoJSON or CSV file stands for ``route,file=NAME``. ConfigError for an
-    unknown name or parameter, or a value that is not of its kind.
+    ``T`` stands for the duration, the name of a GPX, GeoJSON or CSV file for ``route,file=NAME``.
+    ConfigError for an unknown name or parameter, or a value that is not of its kind.
     """
     name, *pairs = (part.strip() for part in text.split(","))
     chosen: dict[str, Any] = {}
@@ -76,7 +80,7 @@ def make_scenario(text: str, **more: Any) -> Scenario:
         key, equals, value = pair.partition("=")
         if not equals:
             raise ConfigError(f"scenario {name}: {pair!r} is not KEY=VALUE")
-        chosen[key.strip()] = value.strip()
+        chosen[SHORT.get(key.strip(), key.strip())] = value.strip()
     chosen.update(more)
     for key, value in chosen.items():
         if key not in defaults:
