@@ -106,8 +106,11 @@ def test_solve_and_its_check():
     assert set(rows) >= {"gyro_bias", "arw", "heading"}
     assert rows["gyro_bias"]["value"] > 1.0  # deg/h, what the hg1700 has
     assert "hg1700" in rows["gyro_bias"]["grades"]
+    shown = call(DRIVE, "--require", "40", "--solve", "equal").stdout
+    assert "every other source and start error is none" in shown
     assert "l3g4200d" not in rows["gyro_bias"]["grades"]
     text = call(DRIVE, "--require", "40", "--solve", "scale", "--mc", "5").stdout
+    assert "start error is none" not in text
     assert "achieved: cep95 40 m at 150 s" in text
     assert "Monte Carlo: 5 runs" in text
 

@@ -115,6 +115,8 @@ def inverse_lines(study: Study, found: Solution, name: str) -> list[str]:
             f"{row.parameter:24}{number(row.value):>10} {row.unit:15}{number(row.given):>15}"
             f"{factor:>9}  {', '.join(grades_within(row)) or '-'}"
         )
+    if found.how == "equal":
+        lines.append("of these alone, in equal shares: every other source and start error is none")
     return [*lines, f"achieved: {found.text}"]
 
 
