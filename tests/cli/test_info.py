@@ -95,7 +95,9 @@ def test_json_has_what_a_ticket_needs(drive) -> None:
 def test_a_calibration_serves_another_log_of_the_same_car(drive, tmp_path) -> None:
     """The second log has one stop and no departure: by itself it does not show forward."""
     car = tmp_path / "car.toml"
-    assert vehnav("info", drive, "--save-calibration", car).exit_code == 0
+    saving = vehnav("info", drive, "--save-calibration", car)
+    assert saving.exit_code == 0
+    assert f"written    {car}" in saving.stdout
     saved = tomllib.loads(car.read_text(encoding="utf-8"))["input"]
     assert saved["axes"] == "BRU"
     assert saved["mount"] == pytest.approx([0.0, -6.0, 5.0], abs=1.0)

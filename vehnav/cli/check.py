@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 import click
 
@@ -22,6 +22,9 @@ from vehnav.cli.common import (
 
 if TYPE_CHECKING:
     from vehnav.logs.log import ReadOptions
+
+LEVELS: Final = {"error": "error", "warning": "warning", "info": "note"}
+"""Level of a finding -> what it is called."""
 
 
 @command(
@@ -58,7 +61,9 @@ def check(log: str, read_options: ReadOptions, as_json: bool, strict: bool, **op
         click.echo(f"{log}: " + ", ".join(f"{counts[name]} {name}" for name in COUNTS))
         for finding in findings:
             click.echo(finding_line(finding, recording.start_ns))
-        found = [sum(f.level == level for f in findings) for level in ("error", "warning", "info")]
-        verdict = "damaged" if recording.damaged else "sound" if not sum(found[:2]) else "usable"
-        click.echo(f"{verdict}: {found[0]} errors, {found[1]} warnings, {found[2]} notes")
+        found = {level: sum(f.level == level for f in findings) for level in LEVELS}
+        doubts = found["error"] + found["warning"]
+        verdict = "damaged" if recording.damaged else "usable" if doubts else "sound"
+        texts = [f"{n} {LEVELS[level]}{'' if n == 1 else 's'}" for level, n in found.items()]
+        click.echo(f"{verdict}: {', '.join(texts)}")
     finish(damaged=recording.damaged, strict=strict, findings=findings)

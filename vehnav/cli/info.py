@@ -73,4 +73,5 @@ def info(
     print_findings(shown, start_ns=recording.start_ns, least="warning")
     if save_calibration is not None:
         write_calibration(inspection, Path(save_calibration))
+        click.echo(f"written    {save_calibration}", err=as_json)
     finish(damaged=recording.damaged, strict=strict, findings=inspection.findings)

@@ -309,7 +309,7 @@ def write_calibration(inspection: Inspection, path: Path) -> None:
     lines += ["[input]", f'axes = "{orientation.axes}"']
     if orientation.accel_axes is not None:
         lines.append(f'accel_axes = "{orientation.accel_axes}"')
-    angles = ", ".join(repr(float(x / DEG)) for x in orientation.mount)
+    angles = ", ".join(repr(float(x / DEG) + 0.0) for x in orientation.mount)
     lines.append(f"mount = [{angles}]  # roll, pitch, yaw, deg")
     lines.append(f"accel_scale = {_accel_scale(inspection, orientation)!r}")
     with atomic_path(path) as temporary:
