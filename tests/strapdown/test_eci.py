@@ -385,6 +385,33 @@ def test_stops_act_as_in_enu():
     assert not here.v_n[stop_id >= 0].any()
 
 
+@pytest.mark.parametrize("backward", [False, True])
+def test_levelling_settles_in_either_direction_of_time(backward):
+    """At rest a tilt of 1 mrad decays as exp(-k g t), forward and in a record run backward.
+
+    The stop has the number 1: run backward the last one is met first.
+    """
+    dt = 0.01
+    truth = exact(static(lat_deg=50.0), np.arange(0.0, 3.0, dt))
+    inc = truth.increments()
+    inc = inc.reversed() if backward else inc
+    n = truth.t.size
+    control = StopControl(np.ones(n, dtype=np.int64), np.ones(n - 1), True, 2)
+    tilt = np.array([1e-3, 0.0, 0.0])
+    solution = mechanize_eci(
+        inc, position=tuple(truth.position[0]), v_n=(0.4, 0.3, 0.0), control=control,
+        c_nb=Rotation.from_rotvec(tilt).as_matrix() @ truth.c_nb[0],
+    )  # fmt: skip
+    left = Rotation.from_matrix(solution.c_nb[-1] @ truth.c_nb[-1].T).as_rotvec()
+    # the force of a step is seen in the axes of its start: half a step of the Earth's turn
+    late = WGS84.omega_ie * dt
+    # steps of 0.01 s of a loop of 1 s: (1 - 0.01)^n is 1.5 % under the exponential
+    np.testing.assert_allclose(left[:2], tilt[:2] * np.exp(-truth.t[-1]), rtol=0.03, atol=late)
+    turned = left[:2] - tilt[:2]
+    np.testing.assert_allclose(np.abs(solution.tilt_correction[1]), np.abs(turned), atol=2.0 * late)
+    np.testing.assert_allclose(solution.v_before_reset, [[0.0] * 3, [0.4, 0.3, 0.0]], atol=1e-12)
+
+
 def test_gain_that_cannot_settle_is_refused():
     truth = exact(static(lat_deg=50.0), np.arange(0.0, 5.0, 1.0))
     control = StopControl(np.zeros(5, dtype=np.int64), np.ones(4), True, 1)
