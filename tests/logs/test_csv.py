@@ -585,3 +585,36 @@ def test_nine_decimals_around_a_whole_second(tmp_path, first, tail):
     with (tmp_path / "x.csv").open("a") as file:
         file.write(tail)
     np.testing.assert_array_equal(read_csv(path, OPTIONS).imu.t_ns, t)
+
+
+FLOAT_NS = 240
+"""Spacing of a float64 at today's Unix seconds."""
+
+
+@pytest.mark.parametrize(
+    ("other", "rows_lost"), [("", 1), ("nan", 1), ("x", 1), ("{}0", 0), ("{}12345678", 0)]
+)
+def test_a_stamp_unlike_those_at_the_beginning(tmp_path, other, rows_lost):
+    """Behind the sampled lines: the row is lost or read, no other one moves."""
+    rows, at = 200, 150
+    t = 1_700_000_000_999_999_990 + 10_000_001 * np.arange(rows)
+    stamps = [f"{v // 10**9}.{v % 10**9:09d}" for v in t]
+    stamps[at] = other.format(stamps[at])
+    names = "time_s,gyro_x,gyro_y,gyro_z,accel_x,accel_y,accel_z"
+    numbers = [[f"{k}"] * rows for k in range(6)]
+    log = read_csv(write(tmp_path / "x.csv", names, [stamps, *numbers]), OPTIONS)
+    expected = np.delete(t, [at] * rows_lost)
+    assert log.imu.t_ns.size == expected.size
+    assert np.abs(log.imu.t_ns - expected).max() <= FLOAT_NS
+
+
+@pytest.mark.parametrize("whole", ["9223372035", "604799", "1700000000"])
+@pytest.mark.parametrize("decimals", [7, 8, 9])
+def test_every_width_of_fine_seconds(tmp_path, whole, decimals):
+    """From seconds of the GPS week to the last second that nanoseconds can count."""
+    t = int(whole) * 10**9 + np.arange(20) * 10 ** (9 - decimals) * 7
+    stamps = [f"{v // 10**9}.{v % 10**9:09d}"[: len(whole) + 1 + decimals] for v in t.tolist()]
+    table = Table(sniff(write(tmp_path / "x.csv", "t,x", [stamps, ["1"] * 20])), clocks=[0])
+    kept = table.fixed_point(0, decimals)
+    assert kept.tolist() == [int(stamp.replace(".", "")) for stamp in stamps]
+    assert table.numbers(0).tolist() == pytest.approx([float(s) for s in stamps], rel=2.3e-16)

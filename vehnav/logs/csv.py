@@ -54,7 +54,7 @@ def read_csv(path: str, options: ReadOptions) -> Log:
             f"{path}: no time column among {list_names(layout.sheet.names)}; "
             "name it with --columns time_s=NAME (or time_ms, time_us, time_ns)"
         )
-    table = Table(layout.sheet)
+    table = _table(layout)
     findings: list[Finding] = []
     t_ns = choose_clock(table, layout, options, "imu" if layout.imu else "gps")
     inertial = layout.imu
@@ -92,7 +92,7 @@ def read_csv_gnss(path: str, options: ReadOptions) -> tuple[Gnss, list[Finding]]
                 f"{path}: no column for {option}; name it with --columns {option}=NAME; "
                 f"the file has {list_names(layout.sheet.names)}"
             )
-    table = Table(layout.sheet)
+    table = _table(layout)
     findings: list[Finding] = []
     t_ns = choose_clock(table, layout, options, "gps")
     gnss = _gnss(table, layout, t_ns, findings)
@@ -116,7 +116,7 @@ def read_csv_speed(path: str, options: ReadOptions) -> tuple[Speed, list[Finding
             f"{path}: no columns for time and speed; name them with --columns "
             f"speed_m_s=NAME,time_s=NAME; the file has {list_names(layout.sheet.names)}"
         )
-    table = Table(layout.sheet)
+    table = _table(layout)
     findings: list[Finding] = []
     speed = _speed(table, layout, choose_clock(table, layout, options, "imu"), findings)
     if speed is None:
@@ -146,6 +146,12 @@ def gps_options(options: ReadOptions) -> ReadOptions:
 
 
 # ---- records -------------------------------------------------------------------------------
+
+
+def _table(layout: Layout) -> Table:
+    """The rows, every digit of their stamps kept."""
+    clocks = [layout.columns[name].index for name in ("time", "log_time") if layout.has(name)]
+    return Table(layout.sheet, clocks)
 
 
 def _vectors(

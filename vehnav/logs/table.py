@@ -20,8 +20,8 @@ import numpy as np
 import numpy.typing as npt
 
 from vehnav.errors import Finding, FormatError
+from vehnav.logs import digits
 from vehnav.logs.clock import NO_TIME
-from vehnav.logs.digits import digits_at
 from vehnav.logs.log import Array, TimeArray
 
 if TYPE_CHECKING:
@@ -31,6 +31,8 @@ SAMPLE_BYTES: Final = 1 << 18
 SAMPLE_ROWS: Final = 50
 DELIMITERS: Final = ("\t", ";", "|", ",", " ")
 COMMENTS: Final = ("#", "%", "//")
+FINE_TIME: Final = re.compile(r"(\d{5,9}|[1-8]\d{9})\.(\d{7,9})")
+"""Seconds whose digits a float64 does not keep, of a width that stays."""
 MAX_BAD_SHARE: Final = 0.5
 """A column with more text than this does not hold the quantity."""
 
@@ -231,12 +233,13 @@ class Table:
         Lines and fields that did not; grows while columns are taken out.
     """
 
-    def __init__(self, sheet: Sheet) -> None:
-        """Parse the file."""
+    def __init__(self, sheet: Sheet, clocks: Sequence[int] = ()) -> None:
+        """Parse the file; of the columns ``clocks`` all digits are kept."""
         self.sheet = sheet
         self.findings: list[Finding] = []
+        self._exact: dict[int, tuple[TimeArray, int]] = {}
         # every column is parsed: with usecols pandas cuts long rows silently
-        self._frame, found = self._read()
+        self._frame, found = self._read_fine(clocks) or self._read()
         self._long = sorted([line + 1 for line in sheet.long] + found)
         self.rows = len(self._frame)
         if not self.rows:
@@ -247,6 +250,33 @@ class Table:
                 f"dropped (the first is line {self._long[0]})"
             )
             self.findings.append(Finding("bad-rows", "error", text))
+
+    def _read_fine(self, clocks: Sequence[int]) -> tuple[pd.DataFrame, list[int]] | None:
+        """:meth:`_read` with fine stamps taken as text; None where not every row has them."""
+        forms = {k: form for k in clocks if (form := self._fine_form(k))}
+        if not forms:
+            return None
+        # a longer field shows in what is spare
+        widths = {k: f"S{whole + 1 + part + 1}" for k, (whole, part) in forms.items()}
+        frame, found = self._read(dtype=widths)
+        for k, (whole, part) in forms.items():
+            exact = digits.fixed_point(np.asarray(frame[k].to_numpy(), widths[k]), whole, part)
+            if exact is None:
+                self._exact.clear()
+                return None
+            self._exact[k] = exact, part
+            seconds, rest = np.divmod(exact, 10**part)
+            frame[k] = seconds + rest / 10.0**part
+        return frame, found
+
+    def _fine_form(self, column: int) -> tuple[int, int] | None:
+        """Digits before and behind the point of all fields of the sample; None if not alike."""
+        if self.sheet.decimal != ".":
+            return None
+        fields = [row[column] if len(row) > column else "" for row in self.sheet.sample]
+        found = [FINE_TIME.fullmatch(field) for field in fields]
+        forms = {(len(one[1]), len(one[2])) if one else None for one in found}
+        return forms.pop() if len(forms) == 1 else None
 
     def _read(self, **how: Any) -> tuple[pd.DataFrame, list[int]]:
         """The frame, and the numbers of the lines that have too many fields."""
@@ -331,29 +361,15 @@ class Table:
         """
         if self.sheet.decimal != ".":
             return None
-        values = self._from_digits(column, decimals)
-        if values is None:
-            exact = self._again(column, dtype={column: np.int64}, thousands=".")
-            values = None if exact is None else np.asarray(exact.to_numpy(), np.int64)
-        if values is None:
+        if column in self._exact and self._exact[column][1] == decimals:
+            return self._exact[column][0]
+        exact = self._again(column, dtype={column: np.int64}, thousands=".")
+        if exact is None:
             return None
+        values = np.asarray(exact.to_numpy(), np.int64)
         rough = self.numbers(column) * 10.0**decimals
         near = np.max(np.abs(values - rough)) <= 1e-12 * np.max(np.abs(rough)) + 1.0
         return values if near else None
-
-    def _from_digits(self, column: int, decimals: int) -> TimeArray | None:
-        """:meth:`fixed_point` of a first column of constant width, from the bytes of the file."""
-        sheet = self.sheet
-        places = {row[0].find(".") + 1 for row in sheet.sample}
-        if column or self._long or sheet.spaced or sheet.encoding != "utf-8" or len(places) > 1:
-            return None
-        (place,) = places
-        part = digits_at(sheet.path, skip=sheet.skip, rows=self.rows, place=place, count=decimals)
-        if part is None:
-            return None
-        scale = 10**decimals
-        whole = np.rint(self.numbers(column) - part / scale).astype(np.int64)
-        return np.asarray(whole * scale + part, np.int64)
 
     def text(self, column: int) -> pd.Series[Any]:
         """The column as it stands."""
