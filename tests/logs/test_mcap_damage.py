@@ -492,6 +492,15 @@ def test_whole_split_files_are_no_damage(tmp_path):
     assert log.contents[0]["count"] == 300
 
 
+def test_other_drives_in_one_folder_are_not_one_recording(tmp_path):
+    """Merged, the second would be taken for repeated stamps of the first."""
+    part = mcap([Channel("/imu", "cdr", channel().schema, payloads()[:100])])
+    (tmp_path / "city.mcap").write_bytes(part)
+    (tmp_path / "highway.mcap").write_bytes(part)
+    with pytest.raises(LogError, match=r"not the parts of one recording \(city.mcap, highway.mcap"):
+        read_mcap(tmp_path, ReadOptions())
+
+
 def test_the_checksums_of_the_tests_are_those_of_the_format():
     data = file("none")
     chunk = chunks(data)[0]

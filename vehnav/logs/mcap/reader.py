@@ -84,12 +84,19 @@ def _keep_pages() -> None:
 
 
 def _files(path: Path) -> list[Path]:
-    """The MCAP files to read."""
+    """The MCAP files to read; LogError where those of a folder are not one recording's parts."""
     if not path.is_dir():
         return [path]
     files = sorted(path.glob("*.mcap"), key=_split_order)
     if not files:
         raise LogError(f"{path}: no .mcap file in this folder")
+    recordings = {_split_order(file)[0] for file in files}
+    if len(recordings) > 1 and not (path / "metadata.yaml").is_file():
+        names = ", ".join(file.name for file in files[:3])
+        raise LogError(
+            f"{path}: {len(files)} MCAP files that are not the parts of one recording ({names}"
+            f"{', ...' if len(files) > 3 else ''}): no metadata.yaml and other names; name one file"
+        )
     return files
 
 
