@@ -212,7 +212,10 @@ class Result:
     def csv(self) -> str:
         """ConfigError where the answer is no table of sources."""
         if self._csv is None:
-            raise ConfigError("csv is the table of sources; this answer has --format json")
+            raise ConfigError(
+                "csv is the table of sources of one sensor (--sensor NAME); this answer goes to "
+                ".json or .txt"
+            )
         return self._csv
 
     def write(self, path: Path) -> None:
