@@ -79,11 +79,16 @@ def test_writing_whole_costs_no_format_and_no_compiler() -> None:
     assert (done.stdout.strip(), done.stderr) == ("[]", "")
 
 
-@pytest.mark.parametrize("write", [True, False])
-def test_what_cannot_be_written_is_named_as_it_was_asked_for(tmp_path: Path, write: bool) -> None:
+@pytest.mark.parametrize("begun", [True, False])
+def test_what_cannot_be_written_is_named_as_it_was_asked_for(tmp_path: Path, begun: bool) -> None:
     target = tmp_path / "missing" / "a.csv"
-    with pytest.raises(FileNotFoundError) as caught, atomic_path(target) as temporary:
-        if write:
-            temporary.write_text("new")
+
+    def write() -> None:
+        with atomic_path(target) as temporary:
+            if begun:
+                temporary.write_text("new")
+
+    with pytest.raises(FileNotFoundError) as caught:
+        write()
     assert caught.value.filename == str(target)
     assert caught.value.strerror == "its folder does not exist"
