@@ -15,6 +15,8 @@ from vehnav.logs.log import TimeArray
 
 WORD: Final = 8
 """Bytes, and digits, in an integer."""
+BLOCK: Final = 1 << 13
+"""Fields taken at once: they stay in the cache of the processor."""
 _EACH: Final = np.uint64(0x0101010101010101)
 
 Characters = npt.NDArray[np.uint8]
@@ -30,6 +32,17 @@ def fixed_point(fields: npt.NDArray[np.bytes_], whole: int, part: int) -> TimeAr
     >>> fixed_point(np.array([b"12.50", b"7.25"], "S8"), 2, 2) is None
     True
     """
+    values = np.zeros(fields.size, np.int64)
+    for first in range(0, fields.size, BLOCK):
+        block = _block(fields[first : first + BLOCK], whole, part)
+        if block is None:
+            return None
+        values[first : first + BLOCK] = block
+    return values
+
+
+def _block(fields: npt.NDArray[np.bytes_], whole: int, part: int) -> TimeArray | None:
+    """:func:`fixed_point` of some fields."""
     length = fields.dtype.itemsize
     rows = np.ascontiguousarray(fields).view(np.uint8).reshape(fields.size, length)
     end = whole + 1 + part
