@@ -116,6 +116,15 @@ def test_a_calibration_serves_another_log_of_the_same_car(drive, tmp_path) -> No
     assert not (tmp_path / "no.toml").exists()
 
 
+def test_a_calibration_leaves_open_what_no_stop_shows(shared_data, tmp_path) -> None:
+    """Turning in circles shows the axes, but neither the mounting nor the scale."""
+    car = tmp_path / "car.toml"
+    log = shared_data / "boston_apan" / "going_in_circles.mcap"
+    assert vehnav("info", log, "--save-calibration", car).exit_code == 0
+    saved = tomllib.loads(car.read_text(encoding="utf-8"))["input"]
+    assert saved == {"axes": "FRD"}
+
+
 def test_run_takes_the_calibration(drive, tmp_path) -> None:
     car = tmp_path / "car.toml"
     vehnav("info", drive, "--save-calibration", car)

@@ -309,17 +309,22 @@ def write_calibration(inspection: Inspection, path: Path) -> None:
     lines += ["[input]", f'axes = "{orientation.axes}"']
     if orientation.accel_axes is not None:
         lines.append(f'accel_axes = "{orientation.accel_axes}"')
-    angles = ", ".join(repr(float(x / DEG) + 0.0) for x in orientation.mount)
-    lines.append(f"mount = [{angles}]  # roll, pitch, yaw, deg")
-    lines.append(f"accel_scale = {_accel_scale(inspection, orientation)!r}")
+    lines += _measured(inspection, orientation)
     with atomic_path(path) as temporary:
         temporary.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
-def _accel_scale(inspection: Inspection, orientation: Orientation) -> float:
-    """Gravity over the force at rest, with the scale already in force."""
+def _measured(inspection: Inspection, orientation: Orientation) -> list[str]:
+    """Mounting and scale, where the log shows them; what it does not show is left open."""
     gnss, rest = inspection.log.gnss, orientation.evidence.rest
+    angles = ", ".join(repr(float(x / DEG) + 0.0) for x in orientation.mount)
+    lines = [f"mount = [{angles}]  # roll, pitch, yaw, deg"]
+    if not rest.stops and not any(orientation.mount):
+        lines = ["# mount: not known, the log has no stop"]
     if gnss is None or not gnss.t_ns.size or not rest.stops:
-        return inspection.accel_scale
+        if inspection.accel_scale != 1.0:
+            return [*lines, f"accel_scale = {inspection.accel_scale!r}  # as given"]
+        return [*lines, "# accel_scale: not known, it takes a stop and the place by GPS"]
     gravity = normal_gravity(float(gnss.lat[0]), float(gnss.height[0]), WGS84)
-    return float(inspection.accel_scale * gravity / np.linalg.norm(rest.force))
+    scale = float(inspection.accel_scale * gravity / np.linalg.norm(rest.force))
+    return [*lines, f"accel_scale = {scale!r}"]
