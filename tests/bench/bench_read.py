@@ -2,8 +2,8 @@
 
 All by processor time (of all threads), which a busy machine does not stretch as it does wall time.
 Files are generated in a temporary folder. ``VEHNAV_BENCH_MESSAGES`` sets the IMU messages (60 000;
-one hour at 200 Hz has 720 000), ``VEHNAV_BENCH_CAMERA_MB`` the camera blobs that one of the files has
-beside them (100).
+one hour at 200 Hz has 720 000), ``VEHNAV_BENCH_CAMERA_MB`` the camera blobs that one of the files
+has beside them (100).
 """
 
 from __future__ import annotations
