@@ -18,6 +18,7 @@ from vehnav.earth import (
     ecef_from_geodetic,
     geodetic_from_ecef,
     geodetic_from_local_enu,
+    in_axes_of,
     local_enu,
     normal_gravity,
     position_difference,
@@ -123,6 +124,38 @@ def test_c_en_holds_east_north_up() -> None:
     for column, direction in enumerate((east, north, up)):
         unit = direction[0] / np.linalg.norm(direction)
         assert np.abs(c_en(lat, lon)[:, column] - unit).max() < 1e-10
+
+
+def in_axes_by_pyproj(v: np.ndarray, place: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """A vector at one place (deg), by way of ECEF, in the axes of the other; both at h = 0."""
+    cart, topo = "+proj=cart +ellps=WGS84", "+proj=topocentric +ellps=WGS84"
+    here, there = (f"{topo} +lat_0={lat:.17g} +lon_0={lon:.17g}" for lat, lon in (place, other))
+    to_ecef = pyproj.Transformer.from_pipeline(f"+proj=pipeline +step +inv {here}")
+    from_ecef = pyproj.Transformer.from_pipeline(f"+proj=pipeline +step {there}")
+    origin = pyproj.Transformer.from_pipeline(cart).transform([other[1]], [other[0]], [0.0])
+    head, tail = (np.array(to_ecef.transform(*x)) for x in (v, np.zeros(3)))
+    return np.array(from_ecef.transform(*(np.ravel(origin) + head - tail)))
+
+
+def test_axes_of_a_near_place_turn_beyond_85_degrees_only() -> None:
+    """Vectors and their matrices; a metre from the pole, over the pole, and on both sides of 85."""
+    at = np.array([[89.99999, 10.0], [89.99999, 0.0], [-88.0, 179.9], [84.9999, 20.0],
+                   [85.0001, 20.0], [47.0, 8.0]])  # fmt: skip
+    to = np.array([[89.99999, 80.0], [89.99999, 180.0], [-88.1, -179.9], [85.0001, 20.4],
+                   [84.9999, 20.4], [47.0, 8.4]])  # fmt: skip
+    c = np.random.default_rng(4).normal(scale=1000.0, size=(6, 3, 3))
+    turned = np.abs(to[:, 0]) > 85.0
+    assert turned.tolist() == [True, True, True, True, False, False]
+    wanted = c.copy()
+    for n in np.flatnonzero(turned):
+        for k in range(3):
+            wanted[n, :, k] = in_axes_by_pyproj(c[n, :, k], at[n], to[n])
+    lat, lon, to_lat, to_lon = (*(at * DEG).T, *(to * DEG).T)
+    got = in_axes_of(c, lat, lon, to_lat=to_lat, to_lon=to_lon)
+    assert np.abs(got - wanted).max() < 1e-8  # m; the coordinates carry 1e-9
+    vectors = in_axes_of(c[:, :, 0], lat, lon, to_lat=to_lat, to_lon=to_lon)
+    assert np.abs(vectors - wanted[:, :, 0]).max() < 1e-8
+    assert np.abs(got - c)[turned].max(axis=(1, 2)).min() > 1.0  # turns of 0.2 degrees and more
 
 
 # ---- curvature, rates --------------------------------------------------------------------------

@@ -161,6 +161,35 @@ def turn_of_axes(
     return np.asarray(np.swapaxes(c_en(to_lat, to_lon), -1, -2) @ c_en(lat, lon))
 
 
+def in_axes_of(x: Array, lat: Array, lon: Array, *, to_lat: Array, to_lon: Array) -> Array:
+    """Vectors or matrices in East-North-Up of one place, in the axes of another where these turn.
+
+    That is where the other place lies beyond :data:`POLAR`; elsewhere East-North-Up of two near
+    places is taken as one, and the values stay as they are.
+
+    Parameters
+    ----------
+    x : (n, 3) or (n, 3, m)
+        Vectors, or matrices whose first index is East-North-Up (C_nb); any unit.
+    lat, lon : (n,)
+        rad: where they are given.
+    to_lat, to_lon : (n,)
+        rad: the other places.
+
+    Returns
+    -------
+    (n, 3) or (n, 3, m)
+        ``x`` itself where no place is polar, else new.
+    """
+    polar = np.flatnonzero(np.abs(to_lat) > POLAR)
+    if not polar.size:
+        return x
+    turn = turn_of_axes(lat[polar], lon[polar], to_lat[polar], to_lon[polar])
+    out = x.copy()
+    out[polar] = np.einsum("kij,kj...->ki...", turn, x[polar])
+    return out
+
+
 def local_enu(
     lat: npt.ArrayLike,
     lon: npt.ArrayLike,

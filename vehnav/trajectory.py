@@ -14,9 +14,9 @@ from vehnav.earth import (
     c_en,
     ecef_from_geodetic,
     geodetic_from_ecef,
+    in_axes_of,
     local_enu,
     radii,
-    turn_of_axes,
 )
 from vehnav.rotation import c_from_quaternion, quaternion_from_c
 from vehnav.units import NS
@@ -166,8 +166,11 @@ def interpolate(trajectory: Trajectory, t_ns: TimeArray) -> Trajectory:
         w = s.reshape(s.shape + (1,) * (x0.ndim - 1))
         return np.asarray((1.0 - w) * x0 + w * x1)
 
-    (v0, c0), (v1, c1) = (_in_axes_of(trajectory, j, lat, lon) for j in (k, k + 1))
-    q0, q1 = quaternion_from_c(c0), quaternion_from_c(c1)
+    def state(x: Array, j: TimeArray) -> Array:
+        return in_axes_of(x[j], trajectory.lat[j], trajectory.lon[j], to_lat=lat, to_lon=lon)
+
+    v0, v1 = (state(trajectory.v_n, j) for j in (k, k + 1))
+    q0, q1 = (quaternion_from_c(state(trajectory.c_nb, j)) for j in (k, k + 1))
     q1 = np.where(np.sum(q0 * q1, axis=1, keepdims=True) < 0.0, -q1, q1)
     sigma_pos, sigma_heading = trajectory.sigma_pos, trajectory.sigma_heading
     return Trajectory(
@@ -183,17 +186,3 @@ def interpolate(trajectory: Trajectory, t_ns: TimeArray) -> Trajectory:
         if sigma_heading is None
         else between(sigma_heading[k], sigma_heading[k + 1]),
     )
-
-
-def _in_axes_of(
-    trajectory: Trajectory, k: TimeArray, lat: Array, lon: Array
-) -> tuple[Array, Array]:
-    """Velocity and attitude of states k; near the poles in the axes of the places given."""
-    v_n, c_nb = trajectory.v_n[k], trajectory.c_nb[k]
-    polar = np.flatnonzero(np.abs(lat) > POLAR)
-    if polar.size:
-        at = k[polar]
-        turn = turn_of_axes(trajectory.lat[at], trajectory.lon[at], lat[polar], lon[polar])
-        v_n[polar] = np.einsum("kij,kj->ki", turn, v_n[polar])
-        c_nb[polar] = turn @ c_nb[polar]
-    return v_n, c_nb

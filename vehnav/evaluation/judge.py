@@ -10,7 +10,7 @@ from typing import Any, Final, Literal
 import numpy as np
 import numpy.typing as npt
 
-from vehnav.earth import POLAR, local_enu, position_difference, turn_of_axes
+from vehnav.earth import in_axes_of, local_enu, position_difference
 from vehnav.errors import Finding
 from vehnav.evaluation.align import Align, Fit, aligned
 from vehnav.evaluation.ape import Relation, ape, evo_statistics, rpe
@@ -184,7 +184,10 @@ def _same_place(trajectory: Trajectory, gnss: Gnss) -> None:
 
 def _subtract(states: Trajectory, judged: Gnss, way: Array) -> Errors:
     """Position and velocity errors, in the axes of the reference near the poles."""
-    states = _in_axes_of(states, judged)
+    v_n, c_nb = (
+        in_axes_of(x, states.lat, states.lon, to_lat=judged.lat, to_lon=judged.lon)
+        for x in (states.v_n, states.c_nb)
+    )
     east, north = position_difference(
         states.lat, states.lon, judged.lat, judged.lon, judged.height
     ).T
@@ -193,7 +196,7 @@ def _subtract(states: Trajectory, judged: Gnss, way: Array) -> Errors:
         lat=judged.lat,
         lon=judged.lon,
         height=judged.height,
-        states=states,
+        states=replace(states, v_n=v_n, c_nb=c_nb),
         east=east,
         north=north,
         up=states.height - judged.height,
@@ -201,20 +204,9 @@ def _subtract(states: Trajectory, judged: Gnss, way: Array) -> Errors:
         cross=east * np.cos(way) - north * np.sin(way),
         distance=np.zeros(east.size),
         course=way,
-        velocity=None if judged.v_n is None else states.v_n - judged.v_n,
+        velocity=None if judged.v_n is None else v_n - judged.v_n,
         reference_sigma=judged.sigma_pos,
     )
-
-
-def _in_axes_of(states: Trajectory, judged: Gnss) -> Trajectory:
-    """The states with velocity and attitude in the axes of the fixes, where these turn fast."""
-    polar = np.abs(judged.lat) > POLAR
-    if not np.any(polar):
-        return states
-    turn = turn_of_axes(states.lat, states.lon, judged.lat, judged.lon)
-    turn[~polar] = np.eye(3)
-    v_n = np.einsum("kij,kj->ki", turn, states.v_n)
-    return replace(states, v_n=v_n, c_nb=turn @ states.c_nb)
 
 
 def _with_attitude(errors: Errors, c_ref: Array | None) -> Errors:

@@ -14,7 +14,7 @@ from vehnav.earth import (
     c_en,
     ecef_from_geodetic,
     geodetic_from_ecef,
-    turn_of_axes,
+    in_axes_of,
 )
 from vehnav.logs.log import Gnss, Speed
 from vehnav.sensors import processes
@@ -121,7 +121,9 @@ def simulate_gnss(
     v_n = None
     sigma_v = None
     if model.velocity_noise is not None:
-        v_n = _in_axes_of(fix, place, velocity_at(truth, valid_ns))
+        # a receiver gives it in the axes of the place that it believes in
+        v_n = velocity_at(truth, valid_ns)
+        v_n = in_axes_of(v_n, place[0], place[1], to_lat=fix[0], to_lon=fix[1])
         v_n = (v_n + model.velocity_noise * velocity_error)[seen]
         sigma_v = np.tile(model.velocity_noise * axes, (v_n.shape[0], 1))
     sigma = float(np.hypot(model.noise, model.drift)) * axes
@@ -156,17 +158,6 @@ def _displaced(place: Place, error: Array, earth: Ellipsoid) -> Place:
         r_e = r_e + error[polar] @ c_en(lat[0], lon[0]).T
         new_lat[polar], new_lon[polar], new_height[polar] = geodetic_from_ecef(r_e, earth=earth)
     return new_lat, new_lon, new_height
-
-
-def _in_axes_of(fix: Place, place: Place, v_n: Array) -> Array:
-    """Velocities at ``place``; near the poles in the axes of the fix, as a receiver gives them."""
-    polar = np.abs(place[0]) > POLAR
-    if not np.any(polar):
-        return v_n
-    turn = turn_of_axes(place[0][polar], place[1][polar], fix[0][polar], fix[1][polar])
-    out = v_n.copy()
-    out[polar] = np.einsum("kij,kj->ki", turn, v_n[polar])
-    return out
 
 
 def _markov(t: Array, normal: Array, *, time: float) -> Array:
