@@ -32,8 +32,6 @@ Array = npt.NDArray[np.float64]
 
 VETO_SPEED: Final = 1.0
 """m/s of GPS, in the median over a stop, that make it none (spec C 1)."""
-ALWAYS: Final = 2**62
-"""ns; no stamp is beyond it."""
 FEW_FIXES: Final = 3
 """Fixes below which GPS gives no start."""
 
@@ -135,7 +133,7 @@ def judge_aided(trajectory: Trajectory, log: Log, use: GpsUse) -> Errors | None:
             trajectory,
             log.gnss,
             judge_from_ns=None if use.until_ns is None else use.until_ns + 1,
-            exclude=_between(use.cut),
+            only=use.cut,
             estimate_offset=not use.aids,
             outages=use.cut or (),
             start_ns=log.start_ns,
@@ -152,21 +150,6 @@ def agreement_with_gps(trajectory: Trajectory, log: Log, use: GpsUse) -> Errors 
         return compare(trajectory, log.gnss)
     except VehnavError:
         return None
-
-
-def _between(cut: tuple[tuple[int, int], ...] | None) -> list[tuple[int, int]]:
-    """The closed intervals outside those of ``cut``, which follow each other; ns."""
-    if cut is None:
-        return []
-    merged: list[tuple[int, int]] = []
-    for start, end in sorted(cut):
-        if merged and start <= merged[-1][1]:
-            merged[-1] = merged[-1][0], max(merged[-1][1], end)
-        else:
-            merged.append((start, end))
-    starts = [-ALWAYS, *(end + 1 for _, end in merged)]
-    ends = [*(start - 1 for start, _ in merged), ALWAYS]
-    return list(zip(starts, ends, strict=True))
 
 
 def outage_intervals(config: Config, start_ns: int, end_ns: int) -> tuple[tuple[int, int], ...]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -123,6 +123,44 @@ def test_excluded_fixes_do_not_judge(circle_trajectory, circle_gnss) -> None:
         "uncertain": 0, "in_gaps": 0,
     }  # fmt: skip
     assert errors.distance[-1] == pytest.approx(1200.0, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("only", "seconds"),
+    [
+        ([(50, 60), (10, 20), (15, 30), (52, 55)], [*range(10, 31), *range(50, 61)]),  # overlap
+        ([(10, 20), (20, 30)], range(10, 31)),
+        ([(10, 20), (21, 21), (22, 30)], range(10, 31)),
+        ([(0, 2)], range(3)),
+    ],
+)
+def test_only_fixes_inside_the_intervals_judge(
+    circle_trajectory, circle_gnss, only: list[tuple[int, int]], seconds: Sequence[int]
+) -> None:
+    """A fix a second; both ends belong to an interval."""
+    spans = [(T0_NS + a * S, T0_NS + b * S) for a, b in only]
+    errors = compare(circle_trajectory(), circle_gnss(), only=spans)
+    assert ((errors.t_ns - T0_NS) // S).tolist() == list(seconds)
+    assert errors.counts["excluded"] == 121 - len(seconds)
+
+
+def test_a_nanosecond_inside_an_interval_judges(circle_trajectory, circle_gnss) -> None:
+    spans = [(T0_NS + 10 * S + 1, T0_NS + 20 * S - 1), (T0_NS + 20 * S + 1, T0_NS + 30 * S)]
+    errors = compare(circle_trajectory(), circle_gnss(), only=spans)
+    assert ((errors.t_ns - T0_NS) // S).tolist() == [*range(11, 20), *range(21, 31)]
+
+
+def test_excluded_fixes_do_not_judge_inside_the_intervals_either(
+    circle_trajectory, circle_gnss
+) -> None:
+    exclude, only = [(T0_NS + 12 * S, T0_NS + 13 * S)], [(T0_NS + 10 * S, T0_NS + 20 * S)]
+    errors = compare(circle_trajectory(), circle_gnss(), exclude=exclude, only=only)
+    assert ((errors.t_ns - T0_NS) // S).tolist() == [10, 11, *range(14, 21)]
+
+
+def test_without_an_interval_no_fix_judges(circle_trajectory, circle_gnss) -> None:
+    with pytest.raises(LogError, match="only 0 GPS fixes can judge"):
+        compare(circle_trajectory(), circle_gnss(), only=[])
 
 
 def test_fixes_in_a_gap_of_the_trajectory_are_left_out(circle_trajectory, circle_gnss) -> None:

@@ -40,6 +40,7 @@ def compare(
     *,
     judge_from_ns: int | None = None,
     exclude: Sequence[Interval] = (),
+    only: Sequence[Interval] | None = None,
     time_offset: float | Literal["auto"] = 0.0,
     estimate_offset: bool = False,
     lever_arm: npt.ArrayLike | None = None,
@@ -60,6 +61,8 @@ def compare(
         count.
     exclude : sequence of (int, int)
         Intervals whose fixes do not judge, ns, both ends included.
+    only : sequence of (int, int) or None
+        Intervals outside which no fix judges, ns, both ends included; None: no such limit.
     time_offset : float or "auto"
         s, added to the stamps of the GPS: minus its delay. ``auto``: what the motion says.
     estimate_offset : bool
@@ -98,6 +101,7 @@ def compare(
         moved,
         judge_from_ns=judge_from_ns,
         exclude=exclude,
+        only=only,
         lever_arm=lever_arm,
         align=align,
         c_nb_reference=c_nb_reference,
@@ -145,13 +149,19 @@ def _series(
     *,
     judge_from_ns: int | None,
     exclude: Sequence[Interval],
+    only: Sequence[Interval] | None,
     lever_arm: npt.ArrayLike | None,
     align: Align,
     c_nb_reference: Array | None,
 ) -> Errors:
     """Match, align, subtract; the course and the path are those of the whole reference."""
     matched = match(
-        trajectory, gnss, judge_from_ns=judge_from_ns, exclude=exclude, lever_arm=lever_arm
+        trajectory,
+        gnss,
+        judge_from_ns=judge_from_ns,
+        exclude=exclude,
+        only=only,
+        lever_arm=lever_arm,
     )
     judged = fixes(gnss, matched.index)
     if align in ("none", "yaw"):

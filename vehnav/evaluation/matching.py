@@ -79,6 +79,7 @@ def match(
     *,
     judge_from_ns: int | None,
     exclude: Sequence[Interval],
+    only: Sequence[Interval] | None,
     lever_arm: npt.ArrayLike | None,
 ) -> Matched:
     """The judged fixes and the states there; LogError where fewer than three remain."""
@@ -91,7 +92,10 @@ def match(
     t = gnss.t_ns
     outside = (t < trajectory.t_ns[0]) | (t > trajectory.t_ns[-1])
     before = ~outside & (t < judge_from_ns if judge_from_ns is not None else np.zeros(t.size, bool))
-    excluded = ~outside & ~before & in_intervals(t, exclude)
+    barred = in_intervals(t, exclude)
+    if only is not None:
+        barred |= ~in_intervals(t, only)
+    excluded = ~outside & ~before & barred
     doubtful = ~outside & ~before & ~excluded & uncertain(gnss)
     gaps = ~outside & ~before & ~excluded & ~doubtful & in_long_gaps(t, trajectory.t_ns)
     index = np.flatnonzero(~(outside | before | excluded | doubtful | gaps))
