@@ -5,6 +5,7 @@ import pickle
 
 import pytest
 
+from vehnav.batch.baseline import read_baseline
 from vehnav.batch.model import (
     BarResult,
     Result,
@@ -15,7 +16,7 @@ from vehnav.batch.model import (
     results_from_dict,
     write_results,
 )
-from vehnav.errors import FormatError
+from vehnav.errors import FormatError, VehnavError
 
 GOOD = Result(
     "city",
@@ -95,6 +96,41 @@ def test_what_is_not_a_results_file_is_refused_by_name(tmp_path, change) -> None
     path.write_text(json.dumps(content))
     with pytest.raises(FormatError, match=r"old\.json"):
         read_results(path)
+
+
+AGAIN = "make it again with --update-baseline"
+
+
+@pytest.mark.parametrize(
+    ("content", "results", "baseline"),
+    [
+        ("{", "not a results.json of vehnav: Exp", "not a baseline of vehnav: Exp"),
+        (
+            "[]",
+            "not a results.json of this vehnav: version None, expected 1$",
+            f"not a baseline of this vehnav: version None, expected 1; {AGAIN}$",
+        ),
+        (
+            '{"version": 2}',
+            "not a results.json of this vehnav: version 2, expected 1$",
+            f"not a baseline of this vehnav: version 2, expected 1; {AGAIN}$",
+        ),
+        (
+            '{"version": 1, "suite": "s"}',
+            "not a results.json of vehnav: KeyError 'results'$",
+            "not a baseline of vehnav: KeyError 'results'$",
+        ),
+        (None, "cannot be read: No such file or directory$", "no such baseline; the first one is"),
+    ],
+)
+def test_what_a_file_is_taken_for_is_said(tmp_path, content, results, baseline) -> None:
+    path = tmp_path / "old.json"
+    if content is not None:
+        path.write_text(content)
+    with pytest.raises(FormatError, match=rf"old\.json: {results}"):
+        read_results(path)
+    with pytest.raises(VehnavError, match=rf"old\.json: {baseline}"):
+        read_baseline(path)
 
 
 def test_metric_paths() -> None:

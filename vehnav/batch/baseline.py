@@ -10,11 +10,11 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final, get_args
 
-from vehnav.batch.model import METRICS, VERSION, Result, Results, Status
+from vehnav.batch.model import METRICS, VERSION, Result, Results, Status, read_versioned
 from vehnav.errors import ConfigError, FormatError
 from vehnav.export.atomic import atomic_path
 
@@ -122,31 +122,20 @@ def read_baseline(path: str | Path) -> Baseline:
     FormatError
         It is not a baseline of this version.
     """
-    try:
-        content = json.loads(Path(path).read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise ConfigError(
-            f"{path}: no such baseline; the first one is written by --update-baseline"
-        ) from None
-    except OSError as error:
-        raise FormatError(f"{path}: cannot be read: {error.strerror or error}") from error
-    except ValueError as error:
-        raise FormatError(f"{path}: not a baseline of vehnav: {error}") from error
-    version = content.get("version") if isinstance(content, dict) else None
-    if version != VERSION:
-        raise FormatError(
-            f"{path}: not a baseline of this vehnav: version {version!r}, expected {VERSION}; "
-            "make it again with --update-baseline"
-        )
-    try:
-        kept = tuple(_kept(row) for row in content["results"])
-        suite = str(content["suite"])
-    except (KeyError, TypeError, ValueError, AttributeError) as error:
-        raise FormatError(
-            f"{path}: not a baseline of vehnav: {type(error).__name__} {error}"
-        ) from error
-    _refuse_twins(path, kept)
-    return Baseline(str(path), suite, kept)
+    found = read_versioned(
+        path,
+        _baseline,
+        what="baseline",
+        if_missing="no such baseline; the first one is written by --update-baseline",
+        if_other="make it again with --update-baseline",
+    )
+    _refuse_twins(path, found.kept)
+    return replace(found, path=str(path))
+
+
+def _baseline(content: Mapping[str, Any]) -> Baseline:
+    kept = tuple(_kept(row) for row in content["results"])
+    return Baseline("", str(content["suite"]), kept)
 
 
 def _kept(row: Mapping[str, Any]) -> Kept:

@@ -10,13 +10,15 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Final, Literal, get_args
+from typing import Any, Final, Literal, TypeVar, get_args
 
-from vehnav.errors import FormatError
+from vehnav.errors import ConfigError, FormatError
 from vehnav.export.atomic import atomic_path
+
+T = TypeVar("T")
 
 VERSION: Final = 1
 """Of the form of ``results.json``; a change that breaks a reader raises it."""
@@ -258,22 +260,56 @@ def read_results(path: str | Path) -> Results:
     FormatError
         Unreadable, of another version, or a field is missing or of the wrong kind.
     """
+    return read_versioned(path, results_from_dict, what="results.json")
+
+
+def read_versioned(
+    path: str | Path,
+    build: Callable[[Mapping[str, Any]], T],
+    *,
+    what: str,
+    if_missing: str = "",
+    if_other: str = "",
+) -> T:
+    """What ``build`` makes of a JSON document of this version.
+
+    Parameters
+    ----------
+    path : str or Path
+    build : callable
+        Makes records of plain data; KeyError, TypeError, ValueError or AttributeError where it does
+        not fit.
+    what : str
+        What the file is taken for; for messages.
+    if_missing : str
+        What to say where there is no such file, if that is a mistake of the call.
+    if_other : str
+        What to do about another version.
+
+    Raises
+    ------
+    ConfigError
+        There is no such file, and ``if_missing`` says what to do.
+    FormatError
+        Unreadable, of another version, or a field is missing or of the wrong kind.
+    """
     try:
         content = json.loads(Path(path).read_text(encoding="utf-8"))
     except OSError as error:
+        if if_missing and isinstance(error, FileNotFoundError):
+            raise ConfigError(f"{path}: {if_missing}") from None
         raise FormatError(f"{path}: cannot be read: {error.strerror or error}") from error
     except ValueError as error:
-        raise FormatError(f"{path}: not a results.json of vehnav: {error}") from error
+        raise FormatError(f"{path}: not a {what} of vehnav: {error}") from error
     version = content.get("version") if isinstance(content, dict) else None
     if version != VERSION:
-        raise FormatError(
-            f"{path}: not a results.json of this vehnav: version {version!r}, expected {VERSION}"
-        )
+        text = f"{path}: not a {what} of this vehnav: version {version!r}, expected {VERSION}"
+        raise FormatError(f"{text}; {if_other}" if if_other else text)
     try:
-        return results_from_dict(content)
+        return build(content)
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         raise FormatError(
-            f"{path}: not a results.json of vehnav: {type(error).__name__} {error}"
+            f"{path}: not a {what} of vehnav: {type(error).__name__} {error}"
         ) from error
 
 
