@@ -5,14 +5,13 @@ from __future__ import annotations
 import base64
 import hashlib
 import re
-from collections.abc import Iterator
 from html.parser import HTMLParser
 from pathlib import Path
 
 import numpy as np
 import pytest
 from batch_for_tests import MAX, broken, many, ok, suite
-from report.headless import Browser, find_browser
+from report.headless import Browser
 
 from vehnav.batch import index_table
 from vehnav.batch.baseline import baseline_of
@@ -267,15 +266,6 @@ def test_the_worst_of_a_score_is_the_smallest() -> None:
 
 
 # ---- in a browser ------------------------------------------------------------------------------
-
-
-@pytest.fixture(scope="module")
-def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
-    program = find_browser()
-    if program is None:
-        pytest.skip("no browser is installed")
-    with Browser(program, tmp_path_factory.mktemp("profile")) as found:
-        yield found
 
 
 @pytest.fixture(scope="module")

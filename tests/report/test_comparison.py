@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 from drives import Circle, gnss_of, trajectory_of
-from headless import Browser, find_browser
+from report.headless import Browser
 from test_html import NASTY, Page
 
 from vehnav.cli.main import cli
@@ -182,37 +182,32 @@ def test_figures_name_every_trajectory(three: Comparison, tmp_path: Path) -> Non
     assert all(f">{name}<" in text for name in THREE)
 
 
-def test_in_a_browser_the_cursor_names_every_error(three: Comparison, tmp_path: Path) -> None:
-    program = find_browser()
-    if program is None:
-        pytest.skip("no browser is installed")
+def test_in_a_browser_the_cursor_names_every_error(
+    browser: Browser, three: Comparison, tmp_path: Path
+) -> None:
     path = tmp_path / "all.html"
     path.write_text(render_comparison(three, command=MADE), encoding="utf-8")
-    with Browser(program, tmp_path / "profile") as browser:
-        for width, dark in ((1366, False), (390, True)):
-            browser.open(path, width=width, dark=dark)
-            box = browser.box("#error .plot")
-            browser.point(box["x"] + 0.5 * box["width"], box["y"] + 0.5 * box["height"])
-            said = browser.run("document.querySelector('.readout').textContent")
-            assert re.search(r"60\.\d s · a\.csv 5\.0+\sm · b\.csv 10\.0+\sm · c\.csv", said), said
-            assert browser.run("document.documentElement.scrollWidth") <= width
-            dots = "[...document.querySelectorAll('.map .dot')].map(d => d.style.display)"
-            assert browser.run(dots) == ["block"] * 4
-            browser.run("document.querySelector('input[data-role=free]').click()")
-            hidden = "document.querySelector('.map path.c-free').classList.contains('hidden')"
-            assert browser.run(hidden)
-        assert browser.complaints == []
+    browser.complaints.clear()
+    for width, dark in ((1366, False), (390, True)):
+        browser.open(path, width=width, dark=dark)
+        box = browser.box("#error .plot")
+        browser.point(box["x"] + 0.5 * box["width"], box["y"] + 0.5 * box["height"])
+        said = browser.run("document.querySelector('.readout').textContent")
+        assert re.search(r"60\.\d s · a\.csv 5\.0+\sm · b\.csv 10\.0+\sm · c\.csv", said), said
+        assert browser.run("document.documentElement.scrollWidth") <= width
+        dots = "[...document.querySelectorAll('.map .dot')].map(d => d.style.display)"
+        assert browser.run(dots) == ["block"] * 4
+        browser.run("document.querySelector('input[data-role=free]').click()")
+        hidden = "document.querySelector('.map path.c-free').classList.contains('hidden')"
+        assert browser.run(hidden)
+    assert browser.complaints == []
 
 
-def test_long_names_stay_inside_a_phone(tmp_path: Path) -> None:
-    program = find_browser()
-    if program is None:
-        pytest.skip("no browser is installed")
+def test_long_names_stay_inside_a_phone(browser: Browser, tmp_path: Path) -> None:
     names = [f"{k * 30}.csv" for k in ("drive_", "w" * 4, "a b ")]
     item = made({name: _moved(5.0 * k, 0.0) for k, name in enumerate(names)})
     path = tmp_path / "all.html"
     path.write_text(render_comparison(item, command="vehnav compare"), encoding="utf-8")
     assert all(name in Page(path.read_text(encoding="utf-8")).text for name in names)
-    with Browser(program, tmp_path / "profile") as browser:
-        browser.open(path, width=390)
-        assert browser.run("document.documentElement.scrollWidth") <= 390
+    browser.open(path, width=390)
+    assert browser.run("document.documentElement.scrollWidth") <= 390

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from headless import Browser, find_browser
+from report.headless import Browser
 
 from vehnav.pipeline import Run
 from vehnav.report.html import write_html
@@ -17,15 +16,6 @@ from vehnav.trajectory import interpolate
 
 PIXEL = 2.0
 """px: a mouse is on whole pixels, and lines are 1.5 px wide."""
-
-
-@pytest.fixture(scope="module")
-def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
-    program = find_browser()
-    if program is None:
-        pytest.skip("no browser is installed")
-    with Browser(program, tmp_path_factory.mktemp("profile")) as found:
-        yield found
 
 
 @pytest.fixture(scope="module")
