@@ -57,6 +57,13 @@ def test_a_moved_trajectory_has_the_vector_as_its_error(circle_trajectory, circl
     assert tree["heading_deg"] is None
 
 
+def test_the_horizontal_rms_is_that_of_the_statistics(circle_trajectory, circle_gnss) -> None:
+    errors = compare(circle_trajectory(), circle_gnss())
+    errors = replace(errors, east=np.array([3.0, 0.0]), north=np.array([4.0, -1.0]))
+    assert errors.horizontal_rms == pytest.approx(np.sqrt((25.0 + 1.0) / 2.0))
+    assert errors.horizontal_rms == statistics(errors.horizontal).rms
+
+
 def test_along_and_cross_by_the_course(circle, circle_gnss) -> None:
     """A trajectory that lags 0.5 s is 5 m behind on the arc; one on a larger circle is outside."""
     t = np.arange(0.0, 120.0, 0.01)

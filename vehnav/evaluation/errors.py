@@ -107,6 +107,11 @@ class Errors:
         """(n,) m: size of the horizontal error."""
         return np.asarray(np.hypot(self.east, self.north))
 
+    @property
+    def horizontal_rms(self) -> float:
+        """Root mean square of the horizontal error, m."""
+        return float(np.sqrt(np.mean(self.horizontal**2)))
+
     def statistics(self) -> dict[str, Statistics | None]:
         """The statistics of every series by its name in the report (``heading_deg`` in degrees)."""
         speed = None if self.velocity is None else np.hypot(*self.velocity[:, :2].T)

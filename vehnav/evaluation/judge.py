@@ -309,7 +309,7 @@ def _unapplied(found: TimeOffset | None, applied: float) -> list[Finding]:
 def _below_noise(errors: Errors) -> list[Finding]:
     """Errors under the reference's own uncertainty are not errors of the trajectory."""
     sigma = errors.reference_sigma_m()
-    rms = float(np.sqrt(np.mean(errors.horizontal**2)))
+    rms = errors.horizontal_rms
     if sigma is None or rms > sigma:
         return []
     text = (

@@ -118,17 +118,13 @@ def headline(item: Comparison) -> str:
     """The answer in one sentence: who is nearest, and how far the others are."""
     if len(item.entries) == 1:
         return _alone(item, item.entries[0].errors)
-    ordered = sorted(item.entries, key=lambda e: _rms(e.errors))
+    ordered = sorted(item.entries, key=lambda e: e.errors.horizontal_rms)
     best = ordered[0]
-    rest = "; ".join(f"{e.name} {metres(_rms(e.errors))}" for e in ordered[1:])
+    rest = "; ".join(f"{e.name} {metres(e.errors.horizontal_rms)}" for e in ordered[1:])
     return (
-        f"{best.name} is nearest to {item.against}: {metres(_rms(best.errors))} rms over "
+        f"{best.name} is nearest to {item.against}: {metres(best.errors.horizontal_rms)} rms over "
         f"{metres(float(best.errors.distance[-1]))}; {rest}."
     )
-
-
-def _rms(errors: Errors) -> float:
-    return float(np.sqrt(np.mean(errors.horizontal**2)))
 
 
 def _alone(item: Comparison, errors: Errors) -> str:
@@ -149,7 +145,7 @@ def remark(item: Comparison) -> str:
             "drive (see what was compared)."
         )
     sigma = max((e.errors.reference_sigma_m() or 0.0 for e in item.entries), default=0.0)
-    rms = sorted(_rms(e.errors) for e in item.entries)
+    rms = sorted(e.errors.horizontal_rms for e in item.entries)
     if len(rms) > 1 and rms[1] - rms[0] < sigma:
         parts.append(
             f"The two nearest differ by {metres(rms[1] - rms[0])}, less than {item.against} is "

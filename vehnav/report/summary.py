@@ -5,8 +5,6 @@ from __future__ import annotations
 import math
 from typing import Final
 
-import numpy as np
-
 from vehnav.evaluation import Errors
 from vehnav.orientation import Orientation
 from vehnav.pipeline import Run
@@ -60,8 +58,8 @@ def in_outages(errors: Errors) -> str:
 
 def rms_and_most(errors: Errors) -> str:
     """Of the horizontal errors, in words."""
-    h = errors.horizontal
-    return f"{metres(float(np.sqrt(np.mean(h**2))))} rms, {metres(float(h.max()))} at most"
+    most = float(errors.horizontal.max())
+    return f"{metres(errors.horizontal_rms)} rms, {metres(most)} at most"
 
 
 def metres(value: float) -> str:
