@@ -12,7 +12,7 @@ from typing import Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from vehnav.kernel import kernel
+from vehnav.kernel import entry_kernel, kernel
 
 Array = npt.NDArray[np.float64]
 Vec3 = tuple[float, float, float]
@@ -83,7 +83,7 @@ def curvature_radii(lat: float, h: float, earth: Ellipsoid) -> tuple[float, floa
     return (r_n * (1.0 - earth.e2) / w2 + h, r_n + h)
 
 
-@kernel
+@entry_kernel  # Python calls it, too: not to be compiled by every process
 def normal_gravity(lat: float, h: float, earth: Ellipsoid) -> float:
     """Magnitude of normal gravity, m/s2: Somigliana (004, after eq. 9), second-order free air.
 
@@ -96,7 +96,7 @@ def normal_gravity(lat: float, h: float, earth: Ellipsoid) -> float:
     return gamma * (1.0 - 2.0 * (1.0 + earth.f + earth.m - 2.0 * earth.f * s2) * x + 3.0 * x * x)
 
 
-@kernel
+@entry_kernel
 def earth_rate(lat: float, earth: Ellipsoid) -> Vec3:
     """omega_ie_n, rad/s: the Earth rate in East-North-Up."""
     return (0.0, earth.omega_ie * math.cos(lat), earth.omega_ie * math.sin(lat))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -241,3 +243,21 @@ def test_names_and_environment(monkeypatch) -> None:
     assert expanded("${VEHNAV_THERE}/${VEHNAV_NO_SUCH:-or/else}") == "here/or/else"
     assert folder_name("../a b/..") == "a_b"
     assert folder_name("..") == "log"
+
+
+def test_the_process_that_hands_out_loads_no_compiler(folder) -> None:
+    """Its workers need numba and start the later the longer it takes to load its own."""
+    path = folder / "suite.toml"
+    path.write_text(
+        HEAD + "[[log]]\npath='a.csv'\noptional=true\n"
+        "[[bar]]\nmetric='errors.horizontal_m.max'\nmax=3.0\n"
+    )
+    code = (
+        "import sys; from vehnav.batch.suite import load_suite; load_suite(sys.argv[1]);"
+        "import vehnav.batch.runner, vehnav.batch.index, vehnav.batch.regression;"
+        "print({'numba', 'pandas', 'vehnav.pipeline'} & set(sys.modules))"
+    )
+    found = subprocess.run(
+        [sys.executable, "-c", code, str(path)], capture_output=True, text=True, check=True
+    )
+    assert found.stdout.strip() == "set()"

@@ -17,7 +17,7 @@ import numpy.typing as npt
 
 from vehnav.batch.wording import short, unit_of
 from vehnav.report.markup import esc
-from vehnav.report.svg import HEIGHT, WIDTH
+from vehnav.report.scale import HEIGHT, WIDTH
 
 Array = npt.NDArray[np.float64]
 

@@ -1,14 +1,14 @@
-"""A log of a suite that is simulated: the options of ``vehnav simulate``, as a record."""
+"""A log of a suite that is simulated: the options of ``vehnav simulate``, as a record.
+
+The simulator, and numba with it, is loaded by who simulates or checks: a suite of files does
+without.
+"""
 
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Literal
-
-from vehnav.config import outage_spans
-from vehnav.sensors import load_sensor
-from vehnav.simulate import GnssModel, Setup, WheelModel, make_scenario, simulate_runs, write_log
 
 
 @dataclass(frozen=True)
@@ -44,11 +44,17 @@ class Simulation:
 
     def check(self) -> None:
         """ConfigError for an unknown scenario, parameter or sensor."""
+        from vehnav.sensors import load_sensor
+
         self._scenario()
         load_sensor(self.sensor)
 
     def write(self, path: Path) -> None:
         """Simulate, and write the recording; ConfigError as :meth:`check`, OSError of the disk."""
+        from vehnav.config import outage_spans
+        from vehnav.sensors import load_sensor
+        from vehnav.simulate import GnssModel, Setup, WheelModel, simulate_runs, write_log
+
         way = self._scenario()
         spans = [x for text in self.outage for x in outage_spans(text, way.motion.duration)]
         receiver = GnssModel(
@@ -72,5 +78,7 @@ class Simulation:
         write_log(simulated, path, truth_every=0)
 
     def _scenario(self) -> Any:
+        from vehnav.simulate import make_scenario
+
         more = {"duration": self.duration, "ellipsoid": self.ellipsoid}
         return make_scenario(self.scenario, **{k: v for k, v in more.items() if v is not None})

@@ -81,12 +81,15 @@ def _answer(answers: IO[str], content: Mapping[str, Any]) -> None:
 
 
 def _import_all() -> None:
-    """What every log needs: imported before memory and time count."""
+    """What every log needs: imported before memory and time count, by all workers at once."""
     import vehnav.logs.mcap
     import vehnav.pipeline
     import vehnav.report.document
     import vehnav.report.html
     import vehnav.simulate.mcap_file  # noqa: F401
+    from vehnav.earth import WGS84, normal_gravity
+
+    normal_gravity(0.0, 0.0, WGS84)  # the first call of a kernel sets numba up
 
 
 def limit_memory(size: int) -> None:

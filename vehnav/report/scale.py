@@ -1,15 +1,20 @@
-"""Axes for people: round steps, ticks, and numbers as one reads them."""
+"""Axes for people: the units of a drawing, round steps, ticks, and numbers as one reads them."""
 
 from __future__ import annotations
 
 import math
 from itertools import pairwise
+from typing import Final
 
 import numpy as np
 import numpy.typing as npt
 
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.intp]
+
+WIDTH: Final = 10000
+HEIGHT: Final = 4000
+"""Units of a panel's drawing: a hundred thousandth of an hour is of no interest."""
 
 
 def nice_step(span: float, count: int) -> float:

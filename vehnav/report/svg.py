@@ -16,13 +16,10 @@ import numpy.typing as npt
 from vehnav.report.figures import Band, Curve, Panel, Span
 from vehnav.report.mapping import Ellipse, Map, Place, Track
 from vehnav.report.markup import esc
-from vehnav.report.scale import nice_step, number, ticks
+from vehnav.report.scale import HEIGHT, WIDTH, nice_step, number, ticks
 
 Array = npt.NDArray[np.float64]
 
-WIDTH: Final = 10000
-HEIGHT: Final = 4000
-"""Units of a panel's drawing: a hundred thousandth of an hour is of no interest."""
 FAR: Final = 50.0
 """Times the height of a panel that a line is drawn beyond it."""
 SPAN_TEXT: Final = {"stop": "stops", "gps": "GPS used for the start"}
