@@ -91,8 +91,7 @@ def noise_of(grade, **more):
     """The filter's noise: that of the grade and nothing else."""
     known = {
         "gyro": grade.gyro, "accel": grade.accel, "accel_share": 0.0, "gyro_walk": 0.0,
-        "accel_walk": 0.0, "huber": NOTHING, "gate": NOTHING, "side_slow": 0.0, "up_slow": 0.0,
-        "slow_turn": 0.0, "slow_speed": 0.0, "turn": 0.0, "speed": 0.0, "mount_walk": 0.0,
+        "accel_walk": 0.0, "huber": NOTHING, "gate": NOTHING, "turn": 0.0, "speed": 0.0,
         "odometer_share": 0.0,
     }  # fmt: skip
     return TACTICAL._replace(**(known | more))
@@ -159,7 +158,7 @@ class Drawn:
 
 def draw(way, grade, prior, noise, rng, *, position=1.5, velocity=0.05):
     """Errors of one run; fixes at every second with noise in m and m/s per axis."""
-    p0 = prior.covariance(noise)
+    p0 = prior.covariance()
     x = np.zeros(SIZE)  # not shaken
     x[:CUT] = rng.normal(size=CUT) * np.sqrt(np.diag(p0)[:CUT])
     dt = np.diff(way.t)[:, None]

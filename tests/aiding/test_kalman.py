@@ -21,7 +21,6 @@ N, M, STEPS = 5, 3, 12
 def problem(seed=0):
     rng = np.random.default_rng(seed)
     f = 0.3 * rng.normal(size=(M, N))
-    decay = np.concatenate([np.ones(M), [1.0, 0.8]])
     p0 = np.diag(rng.uniform(0.5, 2.0, N))
     q = np.zeros((N, N))
     q[:M, :M] = 0.05 * np.eye(M)
@@ -29,20 +28,18 @@ def problem(seed=0):
     h = rng.normal(size=(STEPS, 2, N))
     z = rng.normal(size=(STEPS, 2))
     r = rng.uniform(0.2, 1.0, (STEPS, 2))
-    return f, decay, p0, q, h, z, r
+    return f, p0, q, h, z, r
 
 
-def full_transition(f, decay, dt):
+def full_transition(f, dt):
     a = np.zeros((N, N))
     a[:M] = f
-    phi = np.eye(N) + a * dt + 0.5 * dt * dt * a @ a
-    phi[M:] = np.diag(decay)[M:]
-    return phi
+    return np.eye(N) + a * dt + 0.5 * dt * dt * a @ a
 
 
-def batch(f, decay, p0, q, h, z, r, dt, upto):
+def batch(f, p0, q, h, z, r, dt, upto):
     """Weighted least squares over all states at once: means and covariances of every epoch."""
-    phi = full_transition(f, decay, dt)
+    phi = full_transition(f, dt)
     information, vector = np.zeros((STEPS * N, STEPS * N)), np.zeros(STEPS * N)
     information[:N, :N] += np.linalg.inv(p0)
     root = np.linalg.inv(q)
@@ -62,16 +59,16 @@ def batch(f, decay, p0, q, h, z, r, dt, upto):
     return mean.reshape(STEPS, N), covariance
 
 
-def run(f, decay, p0, q, h, z, r, dt, *, feedback=False):
+def run(f, p0, q, h, z, r, dt, *, feedback=False):
     """The kernels as the land filter uses them; with feedback the estimate goes into ``base``."""
     x, p, base = np.zeros(N), p0.copy(), np.zeros(N)
     work, phi = np.zeros((N, N)), np.zeros((M, N))
     transition_rows(f, dt, phi)
-    dense = full_transition(f, decay, dt)
+    dense = full_transition(f, dt)
     out, kept = [], []
     for k in range(STEPS):
         if k:
-            propagate(p, phi, decay, work[:M])
+            propagate(p, phi, work[:M])
             p += q
             x, base = dense @ x, dense @ base
         for j in range(2):
@@ -89,7 +86,7 @@ def run(f, decay, p0, q, h, z, r, dt, *, feedback=False):
 @pytest.mark.parametrize("feedback", [False, True])
 def test_filter_and_smoother_equal_batch_least_squares(feedback):
     data = problem()
-    decay, dt = data[1], 0.4
+    dt = 0.4
     out, kept, phi = run(*data, dt, feedback=feedback)
     for k in (0, 5, STEPS - 1):
         mean, covariance = batch(*data, dt, k + 1)
@@ -108,7 +105,7 @@ def test_filter_and_smoother_equal_batch_least_squares(feedback):
         for hh, gain, innovation, variance in reversed(kept[2 * k : 2 * k + 2]):
             adjoint_update(lam, big, hh, gain, innovation, variance, np.zeros(N))
         if k:
-            adjoint_propagate(lam, big, phi, decay, work)
+            adjoint_propagate(lam, big, phi, work)
 
 
 def test_huber_pull_and_gate():

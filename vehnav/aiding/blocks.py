@@ -71,7 +71,7 @@ def increment(t: Array, dtheta: Array, dvel: Array, k: int, par: Array) -> tuple
         ),
         (
             dvel[k, 0] - par[0] * dt,
-            (dvel[k, 1] - par[1] * dt) * (1.0 - par[14]),
+            (dvel[k, 1] - par[1] * dt) * (1.0 - par[12]),
             dvel[k, 2] - par[2] * dt,
         ),
     )
@@ -134,7 +134,7 @@ def take_off(row: Array, x: Array, earth: Ellipsoid) -> None:
     )
 
 
-@kernel
+@entry_kernel
 def take_off_parameters(par: Array, x: Array) -> None:
     """Remove the errors ``x`` (all states) from a parameter row."""
     for j in range(6):

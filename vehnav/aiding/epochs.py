@@ -24,10 +24,6 @@ from vehnav.aiding.vehicle import (
     ACCEL_SCALE,
     CUT,
     GYRO_SCALE,
-    LIFT,
-    MOUNT_PITCH,
-    MOUNT_YAW,
-    SIDE,
     Noise,
 )
 from vehnav.earth import Ellipsoid
@@ -57,13 +53,12 @@ def predict(
     skewed: Vec3,
     dt: float,
     phi: Array,
-    decay: Array,
     work: Array,
     noise: Noise,
     absolute: bool,
     earth: Ellipsoid,
 ) -> None:
-    """Covariance over an epoch of ``dt`` s around the state ``row``; writes Phi and decay too.
+    """Covariance over an epoch of ``dt`` s around the state ``row``; writes Phi too.
 
     ``rate`` (rad/s) and ``force`` (right and forward, m/s2): means over the epoch, body axes;
     ``shaken`` (6,) and ``skewed``: those of :mod:`vehnav.aiding.vibration`.
@@ -80,10 +75,7 @@ def predict(
         f[a, CUT] = -(skewed[0] * f[a, 12] + skewed[1] * f[a, 13] + skewed[2] * f[a, 14])
     g = f[:, 9:15].copy()
     transition_rows(f, dt, phi)
-    kept = np.exp(-dt / noise.slow_time)
-    decay[SIDE] = kept
-    decay[LIFT] = kept
-    propagate(p, phi, decay, work[:9])
+    propagate(p, phi, work[:9])
     accel = noise.accel + noise.accel_share * np.hypot(force[0], force[1])
     for j in range(6):
         white = accel if j < 3 else noise.gyro
@@ -95,13 +87,6 @@ def predict(
     for j in range(3):
         p[9 + j, 9 + j] += noise.accel_walk * noise.accel_walk * dt
         p[12 + j, 12 + j] += noise.gyro_walk * noise.gyro_walk * dt
-    p[MOUNT_YAW, MOUNT_YAW] += noise.mount_walk * noise.mount_walk * dt
-    p[MOUNT_PITCH, MOUNT_PITCH] += noise.mount_walk * noise.mount_walk * dt
-    speed = np.sqrt(v[0] * v[0] + v[1] * v[1])
-    extra = noise.slow_turn * abs(rate[2]) + noise.slow_speed * speed
-    side, up = noise.side_slow + extra, noise.up_slow + extra
-    p[SIDE, SIDE] += side * side * (1.0 - kept * kept)
-    p[LIFT, LIFT] += up * up * (1.0 - kept * kept)
 
 
 @kernel

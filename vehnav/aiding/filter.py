@@ -80,9 +80,9 @@ class FilterStart:
     ----------
     row : (22,)
         Navigation row.
-    parameters : (16,)
+    parameters : (14,)
         Parameter row.
-    covariance : (25, 25)
+    covariance : (23, 23)
     """
 
     row: Array
@@ -115,15 +115,15 @@ class Filtered:
     ----------
     rows : (n, 22)
         Navigation rows at all instants from the first epoch on; at an epoch after feedback.
-    parameters : (m, 16)
+    parameters : (m, 14)
         At the epochs, after feedback.
-    covariance : (m, 25, 25)
+    covariance : (m, 23, 23)
         At the epochs, after feedback.
     fed_back : (m, 9)
         Navigation errors that were taken off at the epochs.
-    phi : (m, 9, 25), decay : (m, 25)
-        Transition over the block before each epoch.
-    measurements : (rows (u, 25), gains (u, 25), (innovation, variance) (u, 2))
+    phi : (m, 9, 23)
+        First rows of the transition over the block before each epoch.
+    measurements : (rows (u, 23), gains (u, 23), (innovation, variance) (u, 2))
     until : (m,) int64
         Number of measurements applied up to and with each epoch.
     innovations : dict of str to Innovations
@@ -134,21 +134,20 @@ class Filtered:
     covariance: Array
     fed_back: Array
     phi: Array
-    decay: Array
     measurements: tuple[Array, Array, Array]
     until: IntArray
     innovations: dict[str, Innovations]
 
     @property
     def parameter_sigmas(self) -> Array:
-        """(16,) at the last epoch, where a smoother has nothing to add."""
+        """(14,) at the last epoch, where a smoother has nothing to add."""
         return np.asarray(np.sqrt(np.diagonal(self.covariance[-1]))[9:])
 
     def light(self) -> Filtered:
         """Without what only the run back needs: two thirds of the memory."""
         nothing = np.zeros((0, 0))
         return replace(
-            self, covariance=self.covariance[-1:].copy(), phi=nothing, decay=nothing,
+            self, covariance=self.covariance[-1:].copy(), phi=nothing,
             measurements=(nothing, nothing, nothing),
         )  # fmt: skip
 
@@ -198,7 +197,6 @@ def run_epochs(
     covariance: Array,
     fed_back: Array,
     phi: Array,
-    decay: Array,
     kept: tuple[Array, Array, Array, IntArray],
     until: IntArray,
     counts: Array,
@@ -216,17 +214,15 @@ def run_epochs(
             skew = (skewed[e, 0], skewed[e, 1], skewed[e, 2])
             now[:] = par
             for j in range(3):
-                now[3 + j] += par[15] * skew[j]
+                now[3 + j] += par[13] * skew[j]
             run_block(t, dtheta, dvel, coast, a, b, rows, now, absolute, earth)
             rate = mean_rate(t, dtheta, a, b, now)
             dt = t[b] - t[a]
             force = mean_force(t, dvel, a, b)
             predict(
-                p, rows[(a + b) // 2], rate, force, shaken[e], skew, dt, phi[e], decay[e], work,
+                p, rows[(a + b) // 2], rate, force, shaken[e], skew, dt, phi[e], work,
                 noise, absolute, earth,
             )  # fmt: skip
-            par[12] *= decay[e, 21]
-            par[13] *= decay[e, 22]
             for k in range(a, b):
                 if gap_velocity[k] > 0.0:
                     left = (gap_attitude[k, 0], gap_attitude[k, 1], gap_attitude[k, 2])
@@ -284,7 +280,7 @@ def run_filter(
         start.parameters,
         start.covariance,
     )
-    phi, decay = np.zeros((m, 9, SIZE)), np.ones((m, SIZE))
+    phi = np.zeros((m, 9, SIZE))
     kept = (np.zeros((most, SIZE)), np.zeros((most, SIZE)), np.zeros((most, 2)), np.zeros(1, int))
     until, counts = np.zeros(m, np.int64), np.zeros((len(KINDS), 4))
     run_epochs(
@@ -293,11 +289,11 @@ def run_filter(
         _ready(gaps.attitude), _ready(gaps.velocity),
         aids.epochs, aids.stopped, (aids.zupt, aids.zaru, aids.nhc), aids.speed, aids.fix,
         aids.fixes, aids.ago, aids.shaken, aids.skewed, noise, absolute, earth, rows, parameters,
-        covariance, fed_back, phi, decay, kept, until, counts,
+        covariance, fed_back, phi, kept, until, counts,
     )  # fmt: skip
     u = int(kept[3][0])
     return Filtered(
-        rows, parameters, covariance, fed_back, phi, decay,
+        rows, parameters, covariance, fed_back, phi,
         (kept[0][:u], kept[1][:u], kept[2][:u]), until, _innovations(counts),
     )  # fmt: skip
 

@@ -29,8 +29,8 @@ def transition_rows(f: Array, dt: float, phi: Array) -> None:
 
 
 @kernel
-def propagate(p: Array, phi: Array, decay: Array, work: Array) -> None:
-    """P <- Phi P Phi^T: first m rows of Phi given, the others diagonal with ``decay`` (n,)."""
+def propagate(p: Array, phi: Array, work: Array) -> None:
+    """P <- Phi P Phi^T: first m rows of Phi given, the other states constant."""
     m, n = phi.shape
     for a in range(m):
         for b in range(n):
@@ -45,11 +45,8 @@ def propagate(p: Array, phi: Array, decay: Array, work: Array) -> None:
                 total += work[a, c] * phi[b, c]
             p[a, b] = total
         for b in range(m, n):
-            p[a, b] = work[a, b] * decay[b]
+            p[a, b] = work[a, b]
             p[b, a] = p[a, b]
-    for a in range(m, n):
-        for b in range(m, n):
-            p[a, b] *= decay[a] * decay[b]
 
 
 @kernel
@@ -130,11 +127,11 @@ def adjoint_update(
 
 
 @kernel
-def adjoint_propagate(lam: Array, big: Array, phi: Array, decay: Array, work: Array) -> None:
+def adjoint_propagate(lam: Array, big: Array, phi: Array, work: Array) -> None:
     """Back over a step: lambda <- Phi^T lambda, Lambda <- Phi^T Lambda Phi."""
     m, n = phi.shape
     for b in range(n):
-        total = decay[b] * lam[b] if b >= m else 0.0
+        total = lam[b] if b >= m else 0.0
         for a in range(m):
             total += phi[a, b] * lam[a]
         work[0, b] = total
@@ -142,13 +139,13 @@ def adjoint_propagate(lam: Array, big: Array, phi: Array, decay: Array, work: Ar
         lam[b] = work[0, b]
     for a in range(n):  # work = Lambda Phi
         for b in range(n):
-            total = big[a, b] * decay[b] if b >= m else 0.0
+            total = big[a, b] if b >= m else 0.0
             for c in range(m):
                 total += big[a, c] * phi[c, b]
             work[a, b] = total
     for a in range(n):
         for b in range(n):
-            total = decay[a] * work[a, b] if a >= m else 0.0
+            total = work[a, b] if a >= m else 0.0
             for c in range(m):
                 total += phi[c, a] * work[c, b]
             big[a, b] = total

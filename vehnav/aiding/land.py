@@ -91,9 +91,9 @@ class LandResult:
     ----------
     outcome : Outcome
     innovations : dict of str to Innovations
-    parameters : (16,)
+    parameters : (14,)
         Last estimate of the parameter row.
-    parameter_sigmas : (16,)
+    parameter_sigmas : (14,)
     tuning : Tuning
     """
 
@@ -248,7 +248,7 @@ def _filter_start(start: CoarseStart, tuning: Tuning) -> FilterStart:
         gyro_scale=tuning.gyro_scale_prior,
         accel_scale=tuning.accel_scale_prior,
     )
-    return FilterStart(row, par, prior.covariance(tuning.noise))
+    return FilterStart(row, par, prior.covariance())
 
 
 def _outcome(

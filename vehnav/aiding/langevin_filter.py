@@ -111,7 +111,7 @@ def run_langevin(
     n = LANGEVIN_STATES
     y, p = states[0].copy(), covariance[0].copy()
     a, phi, work, g = np.zeros((n, n)), np.zeros((n, n)), np.zeros((n, n)), np.zeros((n, 6))
-    x, h, gain, decay, mean = np.zeros(n), np.zeros(n), np.zeros(n), np.ones(n), np.zeros(6)
+    x, h, gain, mean = np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(6)
     for e in range(epochs.shape[0]):
         if e > 0:
             first, last = epochs[e - 1], epochs[e]
@@ -130,7 +130,7 @@ def run_langevin(
             fill_jacobian(a, middle, mean, False, gravity, earth)
             transition_rows(a, length, phi)
             add_noise(p, before, noise[0], noise[1], 0.5 * length, g)
-            propagate(p, phi, decay, work)
+            propagate(p, phi, work)
             add_noise(p, y, noise[0], noise[1], 0.5 * length, g)
         if fix[e] >= 0:
             x[:] = 0.0

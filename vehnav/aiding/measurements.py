@@ -64,7 +64,7 @@ def body_velocity(h: Array, j: int, c_wb: Mat3, weight: float) -> None:
 
 @kernel
 def no_side_slip(h: Array, v: Vec3, c_wb: Mat3, rate: Vec3, par: Array) -> float:
-    """Z = v_right - (mu v - l omega_up + k v^2 omega_up + n_side) (aiding/vehicle.py)."""
+    """Z = v_right - (mu v - l omega_up + k v^2 omega_up) (aiding/vehicle.py)."""
     h[:] = 0.0
     v_b = mat_t_vec(c_wb, v)
     speed = v_b[1]
@@ -74,21 +74,18 @@ def no_side_slip(h: Array, v: Vec3, c_wb: Mat3, rate: Vec3, par: Array) -> float
     h[16] = -speed
     h[18] = rate[2]
     h[20] = -speed * speed * rate[2]
-    h[21] = -1.0
-    model = mu * speed + (slip * speed * speed - lever) * rate[2] + float(par[12])
-    return v_b[0] - model
+    return v_b[0] - mu * speed - (slip * speed * speed - lever) * rate[2]
 
 
 @kernel
 def no_lift(h: Array, v: Vec3, c_wb: Mat3, par: Array) -> float:
-    """Z = v_up - (p v + n_up)."""
+    """Z = v_up - p v."""
     h[:] = 0.0
     v_b = mat_t_vec(c_wb, v)
     body_velocity(h, 2, c_wb, 1.0)
     body_velocity(h, 1, c_wb, -par[8])
     h[17] = -v_b[1]
-    h[22] = -1.0
-    return v_b[2] - float(par[8]) * v_b[1] - float(par[13])
+    return v_b[2] - float(par[8]) * v_b[1]
 
 
 @kernel

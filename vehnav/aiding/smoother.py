@@ -34,12 +34,12 @@ class Smoothed:
     Attributes
     ----------
     rows : (n, 22)
-    parameters : (m, 16)
+    parameters : (m, 14)
     covariance : (m, 9, 9)
         Of position, velocity and attitude.
-    parameter_sigmas : (16,)
+    parameter_sigmas : (14,)
         At the last epoch.
-    errors : (m, 25)
+    errors : (m, 23)
         Smoothed error of the filter's states, as taken off.
     """
 
@@ -54,7 +54,6 @@ class Smoothed:
 def run_back(
     covariance: Array,
     phi: Array,
-    decay: Array,
     rows: Array,
     gains: Array,
     numbers: Array,
@@ -90,15 +89,15 @@ def run_back(
         for k in range(until[e] - 1, first - 1, -1):
             adjoint_update(lam, big, rows[k], gains[k], numbers[k, 0], numbers[k, 1], vector)
         if e > 0:
-            adjoint_propagate(lam, big, phi[e], decay[e], work)
+            adjoint_propagate(lam, big, phi[e], work)
 
 
 def smoothed_errors(forward: Filtered) -> tuple[Array, Array]:
-    """Run back: errors (m, 25) of the filter's states, covariance (m, 9, 9) of what remains."""
+    """Run back: errors (m, 23) of the filter's states, covariance (m, 9, 9) of what remains."""
     m = forward.until.size
     errors, covariance = np.zeros((m, SIZE)), np.zeros((m, NAVIGATION, NAVIGATION))
     run_back(
-        forward.covariance, forward.phi, forward.decay, *forward.measurements, forward.until,
+        forward.covariance, forward.phi, *forward.measurements, forward.until,
         errors, covariance,
     )  # fmt: skip
     return errors, covariance

@@ -3,15 +3,15 @@
 A car moves along its own forward axis, up to small constants that the filter finds on the way. In
 body axes right-forward-up, at the sensor, with the speed v along the body's forward axis::
 
-    v_right = mu v - l omega_up + k v^2 omega_up + n_side(t)
-    v_up    = p v + n_up(t)
+    v_right = mu v - l omega_up + k v^2 omega_up
+    v_up    = p v
 
 mu, p: the direction of travel lies to the right and above of the forward axis of the body frame as
-it was mounted; l: the sensor sits in front of the axle that does not slide; k: tyre slip; n: what
-remains, correlated in time, a first-order Gauss-Markov process each. The odometer reads
-``(1 + kappa) v``. The gyro reads, besides its biases, ``c s`` about each axis, s the skew of its
-vibration (:mod:`vehnav.aiding.vibration`) and c the share that it loses of it (negative). As
-everywhere the error states are estimate minus truth.
+it was mounted; l: the sensor sits in front of the axle that does not slide; k: tyre slip. What
+remains is correlated over seconds; as white noise at 10 Hz it gets a larger sigma that carries the
+same information. The odometer reads ``(1 + kappa) v``. The gyro reads, besides its biases, ``c s``
+about each axis, s the skew of its vibration (:mod:`vehnav.aiding.vibration`) and c the share that
+it loses of it (negative). As everywhere the error states are estimate minus truth.
 """
 
 from __future__ import annotations
@@ -32,13 +32,11 @@ MOUNT_PITCH: Final = 17
 LEVER: Final = 18
 GYRO_SCALE: Final = 19
 SLIP: Final = 20
-SIDE: Final = 21
-LIFT: Final = 22
-ACCEL_SCALE: Final = 23
-CUT: Final = 24
-SIZE: Final = 25
-"""Number of states: 15 of the error model, kappa, mu, p, l, gyro z scale, k, n_side, n_up, the
-scale of the forward accelerometer, and the share that the gyro loses of lopsided vibration."""
+ACCEL_SCALE: Final = 21
+CUT: Final = 22
+SIZE: Final = 23
+"""Number of states: 15 of the error model, kappa, mu, p, l, gyro z scale, k, the scale of the
+forward accelerometer, and the share that the gyro loses of lopsided vibration."""
 
 
 class Noise(NamedTuple):
@@ -64,14 +62,8 @@ class Noise(NamedTuple):
         m/s, white part of the non-holonomic constraint.
     turn, speed : float
         Added to both: m/s per rad/s of turning, and share of the speed.
-    side_slow, up_slow, slow_time : float
-        m/s, m/s and s: the Gauss-Markov parts.
-    slow_turn, slow_speed : float
-        Added to the driving noise of the slow parts: per rad/s of turning, and share of speed.
     odometer, odometer_share : float
         m/s and share of the speed, white.
-    mount_walk : float
-        rad/sqrt(s): the body moves on its springs and the load shifts.
     huber : float
         Normalised innovations beyond this are weighed down (R inflated).
     gate : float
@@ -91,14 +83,8 @@ class Noise(NamedTuple):
     up: float
     turn: float
     speed: float
-    side_slow: float
-    up_slow: float
-    slow_time: float
-    slow_turn: float
-    slow_speed: float
     odometer: float
     odometer_share: float
-    mount_walk: float
     huber: float = 2.0
     gate: float = 30.0
 
@@ -135,8 +121,8 @@ class Prior:
     slip: float = 0.004
     cut: float = 0.15
 
-    def covariance(self, noise: Noise) -> Array:
-        """P (25, 25) at the start."""
+    def covariance(self) -> Array:
+        """P (23, 23) at the start."""
         sigma = np.array(
             [
                 *self.position,
@@ -152,8 +138,6 @@ class Prior:
                 self.lever,
                 self.gyro_scale,
                 self.slip,
-                noise.side_slow,
-                noise.up_slow,
                 self.accel_scale,
                 self.cut,
             ]
@@ -175,14 +159,8 @@ MEMS: Final = Noise(
     up=0.08,
     turn=0.5,
     speed=0.0055,
-    side_slow=0.0,
-    up_slow=0.0,
-    slow_time=2.0,
-    slow_turn=0.0,
-    slow_speed=0.0,
     odometer=0.1,
     odometer_share=0.01,
-    mount_walk=0.0,
 )
 """Consumer and industrial MEMS.
 

@@ -87,18 +87,18 @@ class Judged:
 def noise() -> Noise:
     """White noise of the sensor, nothing else."""
     figures = dict.fromkeys(Noise._fields, 0.0)
-    figures |= {"gyro": GYRO_NOISE, "accel": ACCEL_NOISE, "slow_time": 1.0}
+    figures |= {"gyro": GYRO_NOISE, "accel": ACCEL_NOISE}
     return Noise(**(figures | {"huber": OFF, "gate": OFF}))
 
 
 def prior() -> Array:
-    """P (25, 25): 1 m, 0.05 m/s, 0.05 deg, 0.5 deg of heading and the biases; no vehicle."""
+    """P (23, 23): 1 m, 0.05 m/s, 0.05 deg, 0.5 deg of heading and the biases; no vehicle."""
     known = Prior(
         tilt=0.05 * DEG, heading=0.5 * DEG, velocity=0.05, position=(1.0, 1.0, 1.0),
         gyro=GYRO_BIAS, accel=ACCEL_BIAS, odometer=0.0, mount=0.0, lever=0.0, gyro_scale=0.0,
         accel_scale=0.0, slip=0.0, cut=0.0,
     )  # fmt: skip
-    return known.covariance(noise())
+    return known.covariance()
 
 
 def draw_run(way: Way, form: Form, seed: int) -> Judged:

@@ -110,9 +110,9 @@ def draw_log(way: Way, heading_sigma: float, seed: int) -> DrawnLog:
 
 
 def by_error_states(log: DrawnLog) -> Looks:
-    """The closed-loop filter of nine error states (of its 24, the others known)."""
+    """The closed-loop filter of nine error states (the others known)."""
     figures = dict.fromkeys(Noise._fields, 0.0)
-    figures |= {"gyro": GYRO_NOISE, "accel": ACCEL_NOISE, "slow_time": 1.0}
+    figures |= {"gyro": GYRO_NOISE, "accel": ACCEL_NOISE}
     noise = Noise(**(figures | {"huber": OFF, "gate": OFF}))
     t, p = log.way.t, np.zeros((SIZE, SIZE))
     p[range(9), range(9)] = log.sigmas**2
