@@ -49,6 +49,14 @@ def test_jerk_is_continuous():
     assert np.max(np.abs(np.diff(jerk))) <= 52.5 * 15.0 / 13.0**3 * dt * 1.01
 
 
+def test_the_time_so_far_is_that_of_the_pieces():
+    way, elapsed = ProgramBuilder(), []
+    for duration in (0.1, 0.2, 0.3, 1000.0):
+        elapsed.append(way.hold(duration).elapsed)
+    assert elapsed == [0.1, 0.1 + 0.2, 0.1 + 0.2 + 0.3, 0.1 + 0.2 + 0.3 + 1000.0]
+    assert way.build().duration == pytest.approx(elapsed[-1], abs=1e-12)
+
+
 def test_distance_and_heading_are_integrals():
     program = example()
     joints = list(program.joints[1:-1])

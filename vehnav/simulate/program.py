@@ -133,12 +133,13 @@ class ProgramBuilder:
     def __init__(self, *, heading: float = 0.0, speed: float = 0.0) -> None:
         self._heading = heading
         self._durations: list[float] = []
+        self._elapsed = 0.0
         self._joints: list[tuple[float, float, float]] = [(speed, 0.0, 0.0)]
 
     @property
     def elapsed(self) -> float:
         """Duration so far, s."""
-        return float(sum(self._durations))
+        return self._elapsed
 
     @property
     def speed(self) -> float:
@@ -159,6 +160,7 @@ class ProgramBuilder:
             o if n is None else n for o, n in zip(old, (speed, yaw_rate, grade), strict=True)
         )
         self._durations.append(duration)
+        self._elapsed += float(duration)
         self._joints.append((new[0], new[1], new[2]))
         return self
 
