@@ -128,6 +128,8 @@ def test_saturation_is_found():
     [
         ({"rate_hz": 0.0}, "must be positive"),
         ({"rate_hz": 0.001}, "less than two samples"),
+        ({"rate_hz": 1e6}, r"600 million samples, .* at most 20 million .* 20 s at this rate"),
+        ({"rate_hz": 1e308}, "samples, of about 1 kB of memory each"),
         ({"sensor": "hg17"}, "catalogue"),
     ],
 )

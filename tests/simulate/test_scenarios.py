@@ -197,6 +197,7 @@ def test_vibration_is_as_real_cars_have_it():
         ("city,duration=100", "no time to drive"),
         ("town,leg=20", "needs .* s more"),
         ("route", "needs file="),
+        ("town,T=1e9", r"town: duration must be at most 604800 s .* 1e\+05 million samples"),
     ],
 )
 def test_refused_with_the_reason(text, says):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Final, Literal
@@ -32,6 +33,8 @@ TimeArray = npt.NDArray[np.int64]
 
 START_NS: Final = 1_767_225_600_000_000_000
 """2026-01-01T00:00:00Z: when simulated logs begin unless told otherwise."""
+MOST_SAMPLES: Final = 20_000_000
+"""Of a drive, which is in memory as a whole, about 1 kB each: a day at 200 Hz, two at 100 Hz."""
 DEFAULT_GNSS: Final = GnssModel()
 
 
@@ -83,9 +86,15 @@ def stamps(duration: float, rate_hz: float, *, start_ns: int = START_NS) -> Time
     """(n,) int64 ns: evenly from ``start_ns`` over ``duration`` s, both ends included."""
     if not (duration > 0.0 and rate_hz > 0.0):
         raise ConfigError("duration and rate must be positive")
-    count = int(np.floor(duration * rate_hz + 1e-6)) + 1
+    count = math.floor(min(duration * rate_hz + 1e-6, 1e18)) + 1
     if count < 2:
         raise ConfigError(f"{duration:g} s at {rate_hz:g} Hz is less than two samples")
+    if count > MOST_SAMPLES:
+        raise ConfigError(
+            f"{duration:g} s at {rate_hz:g} Hz are {count / 1e6:.4g} million samples, of about "
+            f"1 kB of memory each; at most {MOST_SAMPLES / 1e6:g} million are made: "
+            f"{MOST_SAMPLES / rate_hz:.6g} s at this rate"
+        )
     return np.asarray(start_ns + np.rint(np.arange(count) * (1e9 / rate_hz)).astype(np.int64))
 
 

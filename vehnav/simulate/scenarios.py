@@ -53,6 +53,8 @@ SCENARIOS: Final[Mapping[str, Callable[..., Motion]]] = MappingProxyType(
 
 SHORT: Final[Mapping[str, str]] = MappingProxyType({"T": "duration"})
 """Short names of parameters."""
+LONGEST: Final = 604800.0
+"""s, a week: longer drives are not even planned."""
 
 
 def scenario_parameters(name: str) -> dict[str, Any]:
@@ -69,7 +71,8 @@ def make_scenario(text: str, **more: Any) -> Scenario:
     """The scenario of ``NAME[,KEY=VALUE...]``; ``more`` overrides what the text says.
 
     ``T`` stands for the duration, the name of a GPX, GeoJSON or CSV file for ``route,file=NAME``.
-    ConfigError for an unknown name or parameter, or a value that is not of its kind.
+    ConfigError for an unknown name or parameter, a value that is not of its kind, or a drive that
+    is too long.
     """
     name, *pairs = (part.strip() for part in text.split(","))
     chosen: dict[str, Any] = {}
@@ -88,6 +91,13 @@ def make_scenario(text: str, **more: Any) -> Scenario:
             hint = f"; did you mean {close[0]!r}?" if close else f"; it has {', '.join(defaults)}"
             raise ConfigError(f"scenario {name} has no parameter {key!r}{hint}")
         chosen[key] = _as_kind(value, defaults[key], f"scenario {name}: {key}")
+    duration = chosen.get("duration", 0.0)
+    if duration > LONGEST:
+        raise ConfigError(
+            f"scenario {name}: duration must be at most {LONGEST:g} s (a week), not {duration:g}: "
+            f"at 100 Hz these are {duration / 1e4:.4g} million samples, of about 1 kB of memory "
+            "each"
+        )
     return Scenario(name, SCENARIOS[name](**chosen))
 
 
