@@ -74,7 +74,7 @@ by a tenth of a degree over a kilometre, by 45 degrees over a metre at a metre f
 # ---- kernels -----------------------------------------------------------------------------------
 
 
-@kernel
+@entry_kernel  # Python calls it, too: not to be compiled by every process
 def curvature_radii(lat: float, h: float, earth: Ellipsoid) -> tuple[float, float]:
     """(R_M + h, R_N + h), m: radii of the meridian and of the prime vertical (004 eq. 7)."""
     s = math.sin(lat)
@@ -83,7 +83,7 @@ def curvature_radii(lat: float, h: float, earth: Ellipsoid) -> tuple[float, floa
     return (r_n * (1.0 - earth.e2) / w2 + h, r_n + h)
 
 
-@entry_kernel  # Python calls it, too: not to be compiled by every process
+@entry_kernel
 def normal_gravity(lat: float, h: float, earth: Ellipsoid) -> float:
     """Magnitude of normal gravity, m/s2: Somigliana (004, after eq. 9), second-order free air.
 
