@@ -10,7 +10,7 @@ import numpy as np
 from vehnav.budget.drive import IdealDrive, drive_of_trajectory, standing_spans
 from vehnav.errors import ConfigError
 from vehnav.export.load import is_trajectory, load_track
-from vehnav.simulate import ideal_log, make_scenario, stamps
+from vehnav.simulate import SCENARIOS, ideal_log, make_scenario, stamps
 from vehnav.strapdown.increments import Increments
 from vehnav.units import NS
 
@@ -47,9 +47,12 @@ def scenario_drive(text: str, *, rate_hz: float = RATE_HZ) -> IdealDrive:
 def file_drive(path: str) -> IdealDrive | None:
     """The drive of a trajectory file; None where the file is a recording.
 
-    LogError or FormatError for a trajectory that cannot be read.
+    LogError or FormatError for a trajectory that cannot be read, ConfigError for the bare name of
+    a scenario.
     """
     if not is_trajectory(path):
+        if path.partition(",")[0] in SCENARIOS and not Path(path).exists():
+            raise ConfigError(f"{path}: no such file; did you mean {SCENARIO}{path}?")
         return None
     if not Path(path).is_file():
         raise ConfigError(f"{path}: no such file")

@@ -191,3 +191,38 @@ def test_one_config_file_serves_run_and_budget(tmp_path: Path):
 def test_bad_questions_say_what_to_do(args, words, capsys):
     assert status_of(lambda: cli.main(["budget", DRIVE, *args], standalone_mode=False)) == 2
     assert words in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("args", "written", "refused", "words"),
+    [
+        ((), "b.html", "b.csv", "csv is the table of sources of one sensor"),
+        (("--stop-intervals", "100"), "b.svg", "b.csv", "csv is the table of sources"),
+        (("--solve", "equal", "--require", "40"), "b.txt", "b.CSV", "csv is the table of sources"),
+        (("--solve", "equal", "--require", "40"), "b.txt", "b.html", "there is no picture of this"),
+        (("--sensor", "hg1700"), "b.html", "b.xlsx", "expected one of .json"),
+    ],
+)
+def test_what_cannot_be_written_is_refused_before_anything_is(
+    args, written, refused, words, tmp_path: Path, capsys
+):
+    out = [str(tmp_path / written), str(tmp_path / refused)]
+    line = ["budget", DRIVE, *args, "-o", out[0], "-o", out[1]]
+    assert status_of(lambda: cli.main(line, standalone_mode=False)) == 2
+    said = capsys.readouterr()
+    assert f"{refused}: {words}" in said.err
+    assert said.out == ""
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("source", ["town", "town,T=600"])
+def test_the_bare_name_of_a_scenario_is_recognised(source, tmp_path: Path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert status_of(lambda: cli.main(["budget", source], standalone_mode=False)) == 2
+    assert f"{source}: no such file; did you mean scenario:{source}?" in capsys.readouterr().err
+
+
+def test_a_drive_that_is_too_long_is_refused(capsys):
+    line = ["budget", "scenario:town,T=1e9"]
+    assert status_of(lambda: cli.main(line, standalone_mode=False)) == 2
+    assert "town: duration must be at most 604800 s (a week)" in capsys.readouterr().err

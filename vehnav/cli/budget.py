@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import TYPE_CHECKING, Any, Literal, NoReturn
 
 import click
 
@@ -35,6 +35,11 @@ if TYPE_CHECKING:
 
 SOON = 2.0
 """s after its start at which a drive that begins standing is seen to stand."""
+NO_CSV = (
+    "csv is the table of sources of one sensor (--sensor NAME); this answer goes to .json or .txt"
+)
+
+Question = Literal["forward", "solved", "swept", "ranked", "legs"]
 
 
 @command(
@@ -88,6 +93,7 @@ def budget(
     if options["sensor"] is None and not options["legs"]:
         single = any(options[name] is not None for name in ("solve", "mc", "stop_intervals"))
         options["sensor"] = "hg1700" if single else "all"
+    _check_outputs(options, form)
     found, drive = _drive(source, read_options, options, quiet=quiet or form != "table")
     study = _study(drive, options)
     result = _answer(study, found, options, quiet=quiet or form != "table")
@@ -130,10 +136,33 @@ def _check(options: Mapping[str, Any]) -> None:
         raise ConfigError("--solve needs --require M: the error that is allowed")
     if options["mc"] is not None and asked and asked != ["--solve"]:
         raise ConfigError(f"--mc checks one sensor on one drive; not with {asked[0]}")
-    from vehnav.report.budget_page import check_output
 
+
+def _question(options: Mapping[str, Any]) -> Question:
+    """What is asked."""
+    if options["legs"]:
+        return "legs"
+    if options["sensor"] == "all":
+        return "ranked"
+    if options["stop_intervals"] is not None:
+        return "swept"
+    return "forward" if options["solve"] is None else "solved"
+
+
+def _check_outputs(options: Mapping[str, Any], form: str) -> None:
+    """ConfigError for what this answer cannot be written as, before anything is made."""
+    from vehnav.report.budget_page import PICTURES, check_output
+
+    question = _question(options)
+    if form == "csv" and question != "forward":
+        raise ConfigError(NO_CSV)
     for path in options["outputs"]:
         check_output(path)
+        suffix = Path(path).suffix.lower()
+        if suffix == ".csv" and question != "forward":
+            raise ConfigError(f"{path}: {NO_CSV}")
+        if suffix in PICTURES and question in ("solved", "legs"):
+            raise ConfigError(f"{path}: there is no picture of this answer")
 
 
 def _drive(
@@ -194,29 +223,19 @@ def _study(drive: IdealDrive, options: Mapping[str, Any]) -> Study:
 
 
 class Result:
-    """An answer in every form, and the bar that it missed."""
+    """An answer in every form that it has, and the bar that it missed."""
 
     def __init__(
         self,
         lines: list[str],
         document: dict[str, Any],
         *,
-        csv: str | None = None,
+        csv: str = "",
         picture: Any = None,
         missed: str = "",
     ) -> None:
         self.lines, self.document, self.missed = lines, document, missed
-        self.picture, self._csv = picture, csv
-
-    @property
-    def csv(self) -> str:
-        """ConfigError where the answer is no table of sources."""
-        if self._csv is None:
-            raise ConfigError(
-                "csv is the table of sources of one sensor (--sensor NAME); this answer goes to "
-                ".json or .txt"
-            )
-        return self._csv
+        self.picture, self.csv = picture, csv
 
     def write(self, path: Path) -> None:
         """Write a file; the suffix decides."""
@@ -226,8 +245,6 @@ class Result:
         from vehnav.report.budget_page import PICTURES, write_picture
 
         if path.suffix.lower() in PICTURES:
-            if self.picture is None:
-                raise ConfigError(f"{path}: there is no picture of this answer")
             write_picture(self.picture, path)
             return
         text = {
@@ -240,16 +257,17 @@ class Result:
 
 
 def _answer(study: Study, found: Run | None, options: Mapping[str, Any], *, quiet: bool) -> Result:
-    if options["legs"]:
-        return _legs(found, options)
-    if options["sensor"] == "all":
-        return _ranked(study, options)
     from vehnav.sensors import load_sensor
 
+    question = _question(options)
+    if question == "legs":
+        return _legs(found, options)
+    if question == "ranked":
+        return _ranked(study, options)
     sensor = load_sensor(options["sensor"])
-    if options["stop_intervals"] is not None:
+    if question == "swept":
         return _swept(study, sensor, options)
-    if options["solve"] is not None:
+    if question == "solved":
         return _solved(study, sensor, options, quiet=quiet)
     return _forward(study, sensor, options, quiet=quiet)
 
