@@ -187,6 +187,27 @@ def test_the_staircase_is_the_share_of_the_logs(n: int) -> None:
     assert drawn[-1] == 1.0
 
 
+@pytest.mark.parametrize("count", [2, 3, 5])
+def test_lines_that_coincide_are_all_seen(count: int) -> None:
+    """Along the way each is on top for the same length; a line of its own is not interrupted."""
+    x = np.exp(np.random.default_rng(3).standard_normal(30)) * 20.0
+    nearly = [x * (1.0 + 1e-4 * k) for k in range(count)]
+    series = [Series(f"{k}", f"r{k}", row, np.empty(0)) for k, row in enumerate(nearly)]
+    series.insert(1, Series("other", "other", 1.5 * x, np.empty(0)))
+    text = shares_figure(MAX, series, least=0.01, key="k")
+    drawn = dict(re.findall(r'class="curve now c-(\w+)"( style="[^"]*")? d', text))
+    assert drawn["other"] == drawn["r0"] == ""
+    on_top = []
+    for at in range(60 * count):  # pixels along the path, whole periods
+        for k in reversed(range(count)):
+            dash, gap = map(int, re.findall(r"\d+", drawn[f"r{k}"]) or (1, 0))
+            if at % (dash + gap) < dash:
+                on_top.append(k)
+                break
+    assert [on_top.count(k) for k in range(count)] == [60] * count
+    assert text.count('class="points') == 2  # dots lie on each other, too: those of the first
+
+
 @pytest.mark.parametrize(
     ("values", "low", "high"),
     [([1.0], 1.0, 10.0), ([0.3, 44.0], 0.2, 50.0), ([0.0, 5.0], 0.01, 5.0), ([], 0.01, 0.1)],

@@ -31,6 +31,10 @@ FEW: Final = 40
 """Logs up to which each one is a dot on its curve."""
 MOST_LIMITS: Final = 8
 """Bars in a picture; more, for many groups, would hide the curves."""
+DASH: Final = 10
+"""Pixels of a line that another one shares, before the other one shows."""
+APART: Final = 0.004
+"""Of the width of a picture: lines that are nearer everywhere look like one."""
 MANY: Final = 600
 """Points from which they are drawn smaller."""
 ROOM: Final = 1.1
@@ -162,8 +166,16 @@ def shares_figure(metric: str, series: Sequence[Series], *, least: float, key: s
         for limit, role in bars
     ]
     drawn += [_staircase(axis, s.before, "before", s.role) for s in series]
-    drawn += [_staircase(axis, s.values, "now", s.role) for s in series]
-    drawn += [_dots(axis, s.values, s.role) for s in series if s.values.size <= FEW]
+    same = _alike(axis, series)
+    drawn += [
+        _staircase(axis, s.values, "now", s.role, style=_dashes(*place))
+        for s, place in zip(series, same, strict=True)
+    ]
+    drawn += [
+        _dots(axis, s.values, s.role)
+        for s, (k, _) in zip(series, same, strict=True)
+        if k == 0 and s.values.size <= FEW
+    ]
     labels = _x_labels(axis, metric) + _y_labels([(q, f"{100 * q:.0f}") for q in _QUARTERS])
     title = f"{esc(metric)} <small>how many % of the logs are under it</small>"
     spoken = "; ".join(f"{s.name}: median {short(_middle(s.values))}" for s in series)
@@ -180,7 +192,32 @@ def _middle(values: Array) -> float | None:
     return float(np.median(values)) if values.size else None
 
 
-def _staircase(axis: Axis, values: Array, kind: str, role: str) -> str:
+def _alike(axis: Axis, series: Sequence[Series]) -> list[tuple[int, int]]:
+    """Of each line, which it is of those that look like one, and of how many."""
+    places = [np.sort(axis.share(np.abs(s.values))) for s in series]
+    groups: list[list[int]] = []
+    for k, x in enumerate(places):
+        for group in groups:
+            y = places[group[0]]
+            if x.size and x.size == y.size and np.abs(x - y).max() < APART:
+                group.append(k)
+                break
+        else:
+            groups.append([k])
+    found = {k: (n, len(group)) for group in groups for n, k in enumerate(group)}
+    return [found[k] for k in range(len(series))]
+
+
+def _dashes(k: int, count: int) -> str:
+    """The style of line ``k`` of ``count`` that look like one: each shows for a dash in turn.
+
+    >>> _dashes(0, 2), _dashes(1, 2), _dashes(1, 3)
+    ('', 'stroke-dasharray:10 10', 'stroke-dasharray:20 10')
+    """
+    return f"stroke-dasharray:{DASH * (count - k)} {DASH * k}" if k else ""
+
+
+def _staircase(axis: Axis, values: Array, kind: str, role: str, *, style: str = "") -> str:
     """The empirical distribution as steps; of many logs at evenly spaced shares."""
     if not values.size:
         return ""
@@ -190,7 +227,8 @@ def _staircase(axis: Axis, values: Array, kind: str, role: str) -> str:
     xs = np.rint(axis.share(x[at]) * WIDTH).astype(int)
     ys = np.rint((1.0 - (at + 1) / n) * HEIGHT).astype(int)
     steps = "".join(f"H{a}V{b}" for a, b in zip(xs.tolist(), ys.tolist(), strict=True))
-    return f'<path class="curve {kind} c-{role}" d="M0 {HEIGHT}{steps}H{WIDTH}"/>'
+    more = f' style="{style}"' if style else ""
+    return f'<path class="curve {kind} c-{role}"{more} d="M0 {HEIGHT}{steps}H{WIDTH}"/>'
 
 
 def _dots(axis: Axis, values: Array, role: str) -> str:
