@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -281,6 +282,18 @@ def test_header_stamps_that_are_not_set_or_run_wrong_give_way_to_log_time(tmp_pa
         np.testing.assert_array_equal(log.imu.t_ns, d.t + MS)
         assert word in found(log, "clock")
         assert "log time" in found(log, "clock")
+
+
+def test_a_clock_whose_rate_cannot_be_told_says_so(tmp_path):
+    """Two fixes, and a recorder whose time stands: no number, and what is stated stays JSON."""
+    d = drive()
+    imu, fixes, _ = ros_drive(d)
+    fixes.messages = fixes.messages[:2]
+    imu.messages = [(T0, publish, data) for _, publish, data in imu.messages]
+    log = read(tmp_path, mcap([imu, fixes]))
+    np.testing.assert_array_equal(log.imu.t_ns, d.t)
+    assert [row["clock"]["rate_error"] for row in log.contents] == [None, None]
+    json.dumps([dict(row) for row in log.contents], allow_nan=False)
 
 
 def test_gps_on_another_clock_is_put_on_that_of_the_imu(tmp_path):

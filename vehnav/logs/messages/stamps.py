@@ -44,8 +44,9 @@ class ClockStats:
         Median of log time minus stamp.
     spread_s : float
         Its standard deviation, from the median absolute deviation.
-    rate_error : float
-        How much faster the stamps run than log time, relative; nan where too short to tell.
+    rate_error : float or None
+        How much faster the stamps run than log time, relative; None where that cannot be told:
+        fewer than three stamps, or log time that stands.
     backward, repeated, gaps : int
         Steps below zero, of zero, and over 1.5 medians.
     step_s : tuple of float
@@ -54,7 +55,7 @@ class ClockStats:
 
     offset_s: float
     spread_s: float
-    rate_error: float
+    rate_error: float | None
     backward: int
     repeated: int
     gaps: int
@@ -101,15 +102,15 @@ def clock_stats(t_ns: Ints, log_ns: Ints) -> ClockStats:
     )
 
 
-def _rate_error(t_ns: Ints, log_ns: Ints) -> float:
+def _rate_error(t_ns: Ints, log_ns: Ints) -> float | None:
     """Relative, between the medians of the first and the last tenth; what jitter explains is 0."""
     part = max(1, t_ns.size // 10)
     if t_ns.size < 3:
-        return float("nan")
+        return None
     span = (float(np.median(t_ns[-part:])) - float(np.median(t_ns[:part]))) * NS
     recorder = (float(np.median(log_ns[-part:])) - float(np.median(log_ns[:part]))) * NS
     if recorder <= 0:
-        return float("nan")
+        return None
     excess = span - recorder
     if abs(excess) <= min(JITTER_ALLOWANCE_S, 0.25 * recorder):
         return 0.0
@@ -201,6 +202,7 @@ def _doubt(stats: ClockStats, t_ns: Ints) -> str:
     if stats.backward > MAX_BACKWARD_SHARE * t_ns.size or stats.step_s[0] < -CLOCK_SET_S:
         worst = -stats.step_s[0]
         return f"the header stamps run backward {stats.backward} times, by up to {worst:.3g} s"
-    if abs(stats.rate_error) > MAX_RATE_ERROR:
-        return f"the header clock is {100 * stats.rate_error:+.2f} % off the recorder's"
+    error = stats.rate_error
+    if error is not None and abs(error) > MAX_RATE_ERROR:
+        return f"the header clock is {100 * error:+.2f} % off the recorder's"
     return ""
