@@ -94,6 +94,8 @@ def bar_text(bar: BarResult) -> str:
 
 def state_text(result: Result) -> str:
     """How a log ended, with the reason."""
+    if result.status == "timeout" and result.error:
+        return result.error
     text = STATES[result.status]
     return f"{text}: {result.error}" if result.error else text
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shlex
+import shutil
 import signal
 import sys
 from collections.abc import Iterator
@@ -154,7 +155,8 @@ def score(suite: str | None, as_json: bool, quiet: bool, **options: Any) -> None
     elif not quiet:
         from vehnav.cli.score_screen import screen
 
-        click.echo(screen(results, comparison))
+        width = shutil.get_terminal_size().columns if sys.stdout.isatty() else None
+        click.echo(screen(results, comparison, width=width))
     _write(results, comparison, out, options)
     _leave(results, comparison, loaded, out, options, quiet=quiet or as_json)
 
