@@ -20,7 +20,7 @@ from vehnav.config import Config
 from vehnav.export.recording import write_recording
 from vehnav.mounting import sensor_to_body
 from vehnav.pipeline import search_stops
-from vehnav.simulate import simulate
+from vehnav.simulate import simulate, write_log
 
 
 def vehnav(*args: object) -> Result:
@@ -233,6 +233,72 @@ def test_check_of_a_damaged_recording_leaves_with_3(sample_logs, tmp_path) -> No
     assert counts["damaged"] is True
     assert counts["read"] > 0
     assert vehnav("check", cut, "--strict").exit_code == 1
+
+
+def _of_driving(tmp_path: Path) -> Path:
+    """No stop: the rows between 25 and 55 s."""
+    path = write(tmp_path / "rolling.csv", letters="FLU")
+    rows = pd.read_csv(path)
+    t = (rows.t_ns - rows.t_ns[0]) * 1e-9
+    rows[(t > 25.0) & (t < 55.0)].to_csv(path, index=False)
+    return path
+
+
+def _slow(tmp_path: Path) -> Path:
+    """One sample a second."""
+    path = write(tmp_path / "slow.csv", letters="FLU")
+    pd.read_csv(path)[::50].to_csv(path, index=False)
+    return path
+
+
+def _fixes(tmp_path: Path) -> Path:
+    """No IMU."""
+    return write(tmp_path / "drive.csv").with_suffix(".gps.csv")
+
+
+def _cut_in_motion(tmp_path: Path) -> Path:
+    """A drive without a stop, and the end of the file is missing."""
+    made = simulate("shake,duration=60,amplitude=1", sensor="mems-tactical", rate_hz=50.0)
+    whole = tmp_path / "whole.mcap"
+    write_log(made, whole)
+    path = tmp_path / "cut.mcap"
+    path.write_bytes(whole.read_bytes()[: whole.stat().st_size * 2 // 3])
+    return path
+
+
+@pytest.mark.parametrize(
+    ("make", "verdict"),
+    [
+        (lambda tmp_path: write(tmp_path / "good.csv", letters="FLU"), "sound"),
+        (_of_driving, "not navigable"),
+        (_slow, "not navigable"),
+        (_fixes, "not navigable"),
+        (_cut_in_motion, "damaged, not navigable"),
+    ],
+)
+def test_info_and_check_agree_on_what_can_be_navigated(make, verdict, tmp_path) -> None:
+    path = make(tmp_path)
+    navigable = "not navigable" not in verdict
+    checked, shown = vehnav("check", path), vehnav("info", path)
+    assert checked.exit_code == shown.exit_code == (3 if "damaged" in verdict else 0)
+    assert checked.stdout.splitlines()[-1].startswith(f"{verdict}: ")
+    assert ("NOT NAVIGABLE" in shown.stdout) is not navigable
+    documents = [json.loads(vehnav(name, path, "--json").stdout) for name in ("check", "info")]
+    for found in documents:
+        assert (found["verdict"], found["navigable"]) == (verdict, navigable)
+        assert (found["problem"] is None) is navigable
+    assert documents[0].items() <= documents[1].items()
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["kitti_oxts/2011_10_03_drive_0042.mcap", "boston_apan/going_in_circles.mcap",
+     "boston_ramirez_1hz/imu.csv", "mcap_by_others/hansmann_navsatfix_50min.mcap"],
+)  # fmt: skip
+def test_real_logs_that_cannot_be_navigated_are_not_called_usable(shared_data, name) -> None:
+    checked, shown = vehnav("check", shared_data / name), vehnav("info", shared_data / name)
+    assert checked.stdout.splitlines()[-1].startswith("not navigable: ")
+    assert "NOT NAVIGABLE" in shown.stdout
 
 
 def test_check_of_what_holds_no_recording(tmp_path) -> None:

@@ -42,28 +42,26 @@ def check(log: str, read_options: ReadOptions, as_json: bool, strict: bool, **op
     """Tell what is wrong with a log: findings only.
 
     Counts what was declared, read, recovered, read from parts that cannot be trusted (unverified)
-    and unusable (bad); then every finding of reading it, of its clocks, units, axes and gaps.
+    and unusable (bad); then every finding of reading it, of its clocks, units, axes and gaps. The
+    last line says whether the log is sound, usable (with warnings), not navigable or damaged.
     Exit status 3 if data was lost, recovered or unverified; 1 with --strict and any warning.
     """
     from vehnav.cli.run import config_from
     from vehnav.logs.read import read_log
-    from vehnav.report.document import finding_rows
-    from vehnav.report.inspection import COUNTS, inspect_log, integrity
+    from vehnav.report.inspection import COUNTS, check_document, inspect_log, integrity
 
     with progress(f"{log}: reading", quiet=as_json):
         recording = read_log(log, read_options)
     inspection = inspect_log(recording, config_from(recording, options))
-    counts, findings = integrity(recording), inspection.findings
+    findings = inspection.findings
     if as_json:
-        rows = finding_rows(findings, recording.start_ns)
-        print_json({"file": log, "integrity": counts, "findings": rows})
+        print_json(check_document(inspection))
     else:
+        counts = integrity(recording)
         click.echo(f"{log}: " + ", ".join(f"{counts[name]} {name}" for name in COUNTS))
         for finding in findings:
             click.echo(finding_line(finding, recording.start_ns))
         found = {level: sum(f.level == level for f in findings) for level in LEVELS}
-        doubts = found["error"] + found["warning"]
-        verdict = "damaged" if recording.damaged else "usable" if doubts else "sound"
         texts = [f"{n} {LEVELS[level]}{'' if n == 1 else 's'}" for level, n in found.items()]
-        click.echo(f"{verdict}: {', '.join(texts)}")
+        click.echo(f"{inspection.verdict}: {', '.join(texts)}")
     finish(damaged=recording.damaged, strict=strict, findings=findings)

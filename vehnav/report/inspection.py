@@ -56,6 +56,20 @@ class Inspection:
         return None if self.search is None else self.search.samples.orientation
 
     @property
+    def navigable(self) -> bool:
+        """Whether ``run`` would take the log as it is."""
+        return not self.problem
+
+    @property
+    def verdict(self) -> str:
+        """In a word: damaged or not navigable (or both), usable with warnings, or sound."""
+        bad = ["damaged"] if self.log.damaged else []
+        bad += [] if self.navigable else ["not navigable"]
+        if bad:
+            return ", ".join(bad)
+        return "sound" if all(f.level == "info" for f in self.findings) else "usable"
+
+    @property
     def findings(self) -> tuple[Finding, ...]:
         """Of reading, of preparing, and that it cannot be navigated."""
         found = [*self.log.findings]
@@ -76,6 +90,13 @@ def inspect_log(log: Log, config: Config) -> Inspection:
     if not search.stops:
         problem = no_stop_advice(log.path, search)
     return Inspection(log, search, problem, config.accel_scale)
+
+
+def check_document(inspection: Inspection) -> dict[str, Any]:
+    """What is wrong with it, as plain data: the same under the same keys as in all of it."""
+    keys = ("file", "integrity", "verdict", "navigable", "problem", "findings")
+    found = document(inspection)
+    return {key: found[key] for key in keys}
 
 
 def document(inspection: Inspection) -> dict[str, Any]:
@@ -99,7 +120,8 @@ def document(inspection: Inspection) -> dict[str, Any]:
         "units": None
         if inspection.orientation is None or inspection.orientation.units is None
         else inspection.orientation.units.to_dict(),
-        "navigable": not inspection.problem,
+        "verdict": inspection.verdict,
+        "navigable": inspection.navigable,
         "problem": inspection.problem or None,
         "findings": finding_rows(inspection.findings, log.start_ns),
     }
