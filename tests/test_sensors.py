@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import tomllib
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -66,6 +68,34 @@ def test_written_and_read_back(name, tmp_path):
     for part in ("gyro", "accel"):
         for attribute, value in vars(getattr(CATALOGUE[name], part)).items():
             assert getattr(getattr(back, part), attribute) == pytest.approx(value, rel=1e-8)
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        '7" rack',
+        "C:\\new\\unit",
+        "a\nb\tc",
+        "\x00\x1b\x7f\x85\u2028",
+        "Gerät 日 \U0001f697",
+        "#]=",
+        "",
+    ],
+)
+def test_any_name_and_source_is_written_and_read_back(name, tmp_path):
+    path = tmp_path / "sensor.toml"
+    sensor = replace(CATALOGUE["hg1700"], name=name)
+    sensor = replace(sensor, sources=dict.fromkeys(sensor.sources, name))
+    path.write_text(sensor_toml(sensor), encoding="utf-8", newline="\n")
+    back = load_sensor(path)
+    assert back.name == name
+    assert back.gyro.bias == pytest.approx(sensor.gyro.bias)
+
+
+def test_a_name_that_is_no_unicode_is_still_written(tmp_path):
+    """As a file name may be that is not UTF-8."""
+    text = sensor_toml(replace(CATALOGUE["hg1700"], name="drive_\udcff"))
+    assert tomllib.loads(text.encode("utf-8").decode())["sensor"]["name"] == "drive_?"
 
 
 def test_file_on_top_of_a_grade(tmp_path):

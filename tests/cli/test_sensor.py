@@ -345,7 +345,7 @@ def test_bad_options_are_exit_2(args, says, tmp_path, monkeypatch) -> None:
 
 def test_a_name_cannot_break_the_file(stood) -> None:
     text = estimate(stood, name='a"b\n[x]\\').text
-    assert tomllib.loads(text)["sensor"]["name"] == "a_b_[x]_"
+    assert tomllib.loads(text)["sensor"]["name"] == 'a"b_[x]\\'
 
 
 def test_one_sample_a_second_is_refused(shared_data) -> None:

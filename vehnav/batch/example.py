@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import glob
-import json
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -15,6 +14,7 @@ from vehnav.errors import ConfigError, VehnavError
 from vehnav.export.atomic import atomic_path
 from vehnav.logs.folders import FOLDERS
 from vehnav.logs.read import identify, read_log
+from vehnav.toml_text import quoted
 
 NAME: Final = "suite.toml"
 OPENED: Final = 10
@@ -221,7 +221,7 @@ def example_text(folder: Path, found: Sequence[Found]) -> str:
     groups: dict[str, list[Found]] = {}
     for row in found:
         groups.setdefault(row.group, []).append(row)
-    parts = [_HEAD.format(name=NAME, suite=_quoted(suite))]
+    parts = [_HEAD.format(name=NAME, suite=quoted(suite))]
     for group, rows in groups.items():
         parts += _log_rows(folder, group, rows, names)
     parts.append(_MIDDLE)
@@ -270,8 +270,8 @@ def _log_rows(
 
 
 def _log_row(path: str, group: str, *, name: str | None = None, remark: str = "") -> str:
-    lines = ["[[log]]", f"path = {_quoted(path)}{remark}", f"group = {_quoted(group)}"]
-    lines += [f"name = {_quoted(name)}"] if name else []
+    lines = ["[[log]]", f"path = {quoted(path)}{remark}", f"group = {quoted(group)}"]
+    lines += [f"name = {quoted(name)}"] if name else []
     return "\n".join(lines) + "\n"
 
 
@@ -280,9 +280,4 @@ def _bar(group: str) -> str:
     metric, limit = "errors.horizontal_m.max", "max = 5000.0    # m; tighten it to what is reached"
     if group.endswith(WITHOUT_GPS):
         metric, limit = "stops.count", "min = 1    # without GPS nothing judges the errors"
-    return f"[[bar]]\ngroup = {_quoted(group)}\nmetric = {_quoted(metric)}\n{limit}\n"
-
-
-def _quoted(text: str) -> str:
-    """A TOML basic string; JSON's is one."""
-    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
+    return f"[[bar]]\ngroup = {quoted(group)}\nmetric = {quoted(metric)}\n{limit}\n"

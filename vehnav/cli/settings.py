@@ -18,6 +18,7 @@ from click.core import ParameterSource
 
 from vehnav.cli.options import TABLES, TableOption
 from vehnav.errors import ConfigError
+from vehnav.toml_text import quoted
 
 
 def table_options(command: click.Command) -> dict[str, TableOption]:
@@ -137,8 +138,7 @@ def _plain(value: Any) -> Any:
 
 def _toml(value: Any) -> str:
     if isinstance(value, Mapping):
-        return "{" + ", ".join(f"{json.dumps(k)} = {_toml(v)}" for k, v in value.items()) + "}"
+        return "{" + ", ".join(f"{quoted(k)} = {_toml(v)}" for k, v in value.items()) + "}"
     if isinstance(value, list):
         return "[" + ", ".join(_toml(item) for item in value) + "]"
-    # a JSON string is a TOML basic string, except DEL, which JSON may leave as it is
-    return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+    return quoted(value) if isinstance(value, str) else json.dumps(value)

@@ -18,6 +18,7 @@ from vehnav.noise.rest import RestNoise
 from vehnav.sensors import CATALOGUE, FIELDS, Sensor, sensor_toml
 from vehnav.sensors.grade import Field, assemble
 from vehnav.sensors.likeness import Likeness, figure_of, likeness
+from vehnav.toml_text import on_one_line
 
 Part = Literal["gyro", "accel"]
 
@@ -70,7 +71,7 @@ class Estimate:
             f"# Measured at rest by 'vehnav sensor'; {self.grades[0].name} is the nearest grade."
         ]
         head += [f"# Not told: {WORDS[key]}: {why}." for key, why in self.untold.items()]
-        return "\n".join(_plain(line) for line in head) + "\n" + sensor_toml(self.sensor)
+        return "\n".join(on_one_line(line) for line in head) + "\n" + sensor_toml(self.sensor)
 
 
 def estimate(noise: RestNoise, *, name: str | None = None) -> Estimate:
@@ -114,7 +115,7 @@ def estimate(noise: RestNoise, *, name: str | None = None) -> Estimate:
     base = _of_grade(CATALOGUE[grades[0].name], limits)
     own = Path(noise.log.path).stem if name is None else name
     measured = _measured(noise, told, times, base)
-    return Estimate(assemble(base, _plain(own), measured), told, untold, tuple(grades))
+    return Estimate(assemble(base, on_one_line(own), measured), told, untold, tuple(grades))
 
 
 def write_sensor(found: Estimate, path: str | os.PathLike[str]) -> None:
@@ -253,8 +254,3 @@ def _row(key: str, figure: Figure, axes: Sequence[Figure]) -> tuple[float, str]:
 
 def _round(value: float) -> float:
     return float(f"{value:.5g}")
-
-
-def _plain(text: str) -> str:
-    """On one line of a TOML file, in a comment or between quotes."""
-    return "".join(c if c.isprintable() and c not in '"\\' else "_" for c in text)

@@ -21,6 +21,7 @@ from vehnav.orientation import Orientation
 from vehnav.pipeline import StopSearch, no_stop_advice, search_stops
 from vehnav.report.document import finding_rows
 from vehnav.report.summary import axes_text, metres
+from vehnav.toml_text import on_one_line
 from vehnav.units import DEG, NS
 
 COUNTS: Final = ("declared", "read", "recovered", "unverified", "bad")
@@ -326,8 +327,8 @@ def write_calibration(inspection: Inspection, path: Path) -> None:
             f"to save{': ' + inspection.problem if inspection.problem else ''}"
         )
     lines = ["# How the sensor sits in the vehicle, established by `vehnav info` from"]
-    lines += [f"# {Path(inspection.log.path).name}, by {orientation.evidence.source}."]
-    lines += [f"# {reason}" for reason in orientation.evidence.reasons]
+    lines += [f"# {on_one_line(Path(inspection.log.path).name)}, by {orientation.evidence.source}."]
+    lines += [f"# {on_one_line(reason)}" for reason in orientation.evidence.reasons]
     lines += ["[input]", f'axes = "{orientation.axes}"']
     if orientation.accel_axes is not None:
         lines.append(f'accel_axes = "{orientation.accel_axes}"')

@@ -11,6 +11,7 @@ from typing import Any
 from vehnav.errors import ConfigError
 from vehnav.sensors.catalogue import CATALOGUE
 from vehnav.sensors.grade import FIELDS, Sensor, assemble
+from vehnav.toml_text import on_one_line, quoted
 
 
 def load_sensor(name_or_path: str | Path) -> Sensor:
@@ -70,7 +71,7 @@ def _from_document(document: Mapping[str, Any], path: Path) -> Sensor:
 
 def sensor_toml(sensor: Sensor) -> str:
     """The sensor as the text of a TOML file that :func:`load_sensor` reads back."""
-    lines = ["[sensor]", f'name = "{sensor.name}"']
+    lines = ["[sensor]", f"name = {quoted(sensor.name)}"]
     default = Sensor("")
     for key, place in FIELDS.items():
         value, plain = (
@@ -81,5 +82,5 @@ def sensor_toml(sensor: Sensor) -> str:
             comment = (
                 f"{place.unit}; {sensor.sources[key]}" if key in sensor.sources else place.unit
             )
-            lines.append(f"{key} = {value / place.factor:.9g}  # {comment}")
+            lines.append(f"{key} = {value / place.factor:.9g}  # {on_one_line(comment)}")
     return "\n".join(lines) + "\n"
