@@ -107,8 +107,10 @@ def test_headline_and_gate(rendered: str) -> None:
 
 
 def test_every_log_says_how_it_moved() -> None:
-    before = suite([ok("a", 10.0), ok("b", 10.0), ok("c", 10.0), ok("d", 10.0)])
-    now = suite([ok("a", 12.0), ok("b", 10.0), broken("c"), ok("d", None), ok("e", 1.0)])
+    before = suite([*(ok(name, 10.0) for name in "abcd"), ok("no-gps", None)])
+    now = suite(
+        [ok("a", 12.0), ok("b", 10.0), broken("c"), ok("d", None), ok("e", 1.0), ok("no-gps", None)]
+    )
     comparison = compare_with(baseline_of(before), now, max_regression=0.05)
     page = Page(render_index(now, comparison=comparison))
     assert {row[1]: row[3] for row in page.rows[1:]} == {
@@ -117,6 +119,7 @@ def test_every_log_says_how_it_moved() -> None:
         "c": "it ran",
         "d": "figure gone",
         "e": "new",
+        "no-gps": "",
     }
 
 

@@ -109,10 +109,14 @@ def test_passed_is_said() -> None:
 
 
 def test_new_and_vanished_logs_are_named() -> None:
-    before, now = suite([ok("a", 1.0), ok("gone", 1.0)]), suite([ok("a", 1.0), ok("fresh", 1.0)])
-    text = read(markdown(now, comparison=compared(before, now))).text
-    assert "1 only in the baseline: gone/default" in text
-    assert "1 not in the baseline: fresh/default" in text
+    before = suite([ok("a", 1.0), ok("gone", 1.0), ok("no-gps", None)])
+    now = suite([ok("a", 1.0), ok("fresh", 1.0), ok("no-gps", None)])
+    page = read(markdown(now, comparison=compared(before, now)))
+    assert "1 only in the baseline: gone/default" in page.text
+    assert "1 not in the baseline: fresh/default" in page.text
+    assert {row[0]: row[4] for row in page.tables[-1][1:]} == {
+        "a": "the same", "fresh": "new", "no-gps": "",
+    }  # fmt: skip
 
 
 @pytest.mark.parametrize("name", [EVIL, "a\nb\x1b[31m|", "_x_", "1. x", "- y", "| z |", "\ud800"])

@@ -183,7 +183,12 @@ LOG = HEAD + '[[log]]\npath = "drives/a.csv"\n'
         (LOG + "[[bar]]\nmetric='errors.up_m.p59'\nmax=1", "did you mean 'p95'"),
         (LOG + "[[bar]]\nmetric='error.up_m.max'\nmax=1", "did you mean 'errors'"),
         (LOG + "[[bar]]\nmetric='errors.up_m.max'\nmax='1'", "max: expected a number, not '1'"),
-        (LOG + "[[bar]]\ngroup='x'\nmetric='errors.up_m.max'\nmax=1", "there is no group 'x'"),
+        (LOG + "[[bar]]\ngroup='x'\nmetric='errors.up_m.max'\nmax=1", "there is no group 'x'$"),
+        (LOG + "group='city'\n[[bar]]\ngroup='cty'\nmetric='errors.up_m.max'\nmax=1",
+         "there is no group 'cty'; did you mean 'city'"),
+        (LOG + "group='a'\n[[log]]\npath='drives/b.csv'\ngroup='b'\nname='other'\n"
+         "[[bar]]\ngroup='a'\nlog='other'\nmetric='errors.up_m.max'\nmax=1",
+         "group 'a' and log 'other' never meet"),
         (LOG + "[baseline]\nmax_regression='some'", "max_regression: expected a share such as 5%"),
         (LOG + "[baseline]\nfle='x'", "unknown key 'fle'; did you mean 'file'"),
         ("[suite", "not a TOML file"),
@@ -196,8 +201,10 @@ def test_faults_are_named(folder, text, message) -> None:
 
 
 def test_a_suite_that_is_not_there(tmp_path) -> None:
-    with pytest.raises(ConfigError, match="cannot be read"):
+    with pytest.raises(ConfigError, match=r"cannot be read.*--init DIR writes a first suite"):
         load_suite(tmp_path / "suite.toml")
+    with pytest.raises(ConfigError, match="a folder; vehnav score --init"):
+        load_suite(tmp_path)
 
 
 def test_a_bar_for_what_was_skipped_is_no_fault(folder) -> None:

@@ -9,6 +9,7 @@ from vehnav.batch.baseline import baseline_of
 from vehnav.batch.model import BarResult, Result
 from vehnav.batch.regression import Paired, compare_with
 from vehnav.batch.wording import (
+    bar_text,
     headline,
     interval_text,
     moved,
@@ -59,6 +60,15 @@ def test_the_more_bars_are_missed_the_worse() -> None:
     bars = (*one.bars, BarResult.of(RMS, "max", 1.0, 30.0))
     two = Result(**{**vars(ok("two", 60.0)), "bars": bars})
     assert [r.log for r in worst_first([one, two])] == ["two", "one"]
+
+
+def test_a_figure_that_is_not_there_says_why() -> None:
+    gone = ok("a", None, more={"gps.fixes_judged": 0.0})
+    assert bar_text(gone.bars[0], gone) == (
+        f"{MAX} is undefined (no GPS fix is left to judge), at most 50 m is allowed"
+    )
+    other = ok("a", None)
+    assert bar_text(other.bars[0], other).startswith(f"{MAX} is undefined, at most")
 
 
 def test_a_group_in_one_sentence() -> None:

@@ -122,12 +122,25 @@ def test_options_that_do_not_fit_are_said_before_anything_runs(suite, tmp_path) 
         (["--max-regression", "much"], "--max-regression: expected a share"),
         (["--memory-limit", "much"], "--memory-limit: expected a size"),
         (["--timeout", "0"], "--timeout"),
+        (["--jobs", "0"], "--jobs"),
+        (["--junit", str(tmp_path / "none" / "x.xml")], "there is no folder"),
+        (["--markdown", str(tmp_path / "none" / "x.md")], "there is no folder"),
+        (
+            ["--baseline", str(tmp_path / "none" / "x.json"), "--update-baseline"],
+            "there is no folder",
+        ),
     ):
         result = vehnav(suite, "-o", tmp_path / "out", *arguments)
         assert result.exit_code == 2, result.output
         assert text in result.stderr
         assert not (tmp_path / "out" / "results.json").exists()
     assert vehnav().exit_code == 2
+
+
+def test_files_may_lie_in_the_folder_of_the_results_which_is_new(suite, tmp_path) -> None:
+    out = tmp_path / "new" / "out"
+    assert vehnav(suite, "-o", out, "--junit", out / "junit.xml").exit_code == 0
+    assert (out / "junit.xml").is_file()
 
 
 def test_absent_logs_are_named(tmp_path) -> None:
@@ -145,3 +158,12 @@ def test_init_and_go(suite, tmp_path) -> None:
     assert made.exit_code == 0, made.output
     assert "1 log" in made.stdout
     assert vehnav(tmp_path / "suite.toml", "-o", tmp_path / "out", "--quiet").exit_code in (0, 1)
+
+
+def test_init_names_some_of_what_it_leaves_out(suite, tmp_path) -> None:
+    suite.unlink()
+    for k in range(30):
+        (tmp_path / f"{k}.jpg").write_bytes(b"\xff\xd8 no log")
+    said = vehnav("--init", tmp_path).stderr
+    assert said.count(".jpg: ") == 20
+    assert "left out: 10 more" in said

@@ -180,6 +180,7 @@ name = {suite}
 # keep = "report"          # of each log: "figures", "report" (its page, too) or "trajectory"
 
 # ---- logs: a file, a folder, a pattern or a URL, with any option of `vehnav run` ----
+# ---- (--gps-time-offset is the key gps_time_offset; --no-reset is reset, false) ----
 """
 
 _MIDDLE: Final = """\

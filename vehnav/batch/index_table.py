@@ -27,17 +27,18 @@ def logs_table(
     if not order:
         return ""
     changes: dict[tuple[str, str], list[Change]] = {}
-    turned = set()
+    turned, new = set(), set()
     if comparison is not None:
         for c in comparison.changes:
             if c.metric == metrics[0] or c.failed:
                 changes.setdefault((c.log, c.config), []).append(c)
-        turned = {(t.log, t.config) for t in comparison.turned if t.failed}
+        turned = {f"{t.log}/{t.config}" for t in comparison.turned if t.failed}
+        new = set(comparison.new)
     columns = _columns(order, metrics[:COLUMNS], compared=comparison is not None)
     rows = []
     for r in order[:ROWS]:
         mine = changes.get((r.log, r.config), ())
-        rows.append(_row(r, columns, mine, turned=(r.log, r.config) in turned))
+        rows.append(_row(r, columns, mine, turned=r.name in turned, new=r.name in new))
     left = len(order) - len(rows)
     note = f'<p class="note">{left} more, which are not worse, are in results.json.</p>'
     return (
@@ -118,7 +119,9 @@ def _head(columns: Sequence[Column]) -> str:
     return "".join(cells)
 
 
-def _row(r: Result, columns: Sequence[Column], changes: Sequence[Change], *, turned: bool) -> str:
+def _row(
+    r: Result, columns: Sequence[Column], changes: Sequence[Change], *, turned: bool, new: bool
+) -> str:
     """One log and configuration; the class of the row is what the filter reads."""
     regressed = turned or any(c.failed for c in changes)
     far = {bar.metric for bar in r.bars if not bar.passed} if r.status == "ok" else set()
@@ -130,7 +133,7 @@ def _row(r: Result, columns: Sequence[Column], changes: Sequence[Change], *, tur
         "log": lambda: f'<td class="log">{link}</td>',
         "config": lambda: f"<td>{esc(r.config)}</td>",
         "group": lambda: f"<td>{esc(r.group)}</td>",
-        "change": lambda: _change_cell(r, changes, first, regressed),
+        "change": lambda: _change_cell(r, changes, first, regressed=regressed, new=new),
         "remarks": lambda: f'<td class="why">{esc(_remark(r))}</td>',
     }
     cells = [
@@ -154,13 +157,17 @@ def _state(r: Result, kind: str) -> str:
     return f'<span class="state bad">{text}</span>'
 
 
-def _change_cell(r: Result, changes: Sequence[Change], metric: str, regressed: bool) -> str:
+def _change_cell(
+    r: Result, changes: Sequence[Change], metric: str, *, regressed: bool, new: bool
+) -> str:
     """How the first figure moved, in words; the number that sorts stands in an attribute."""
     mine = next((c for c in changes if c.metric == metric), None)
     if r.status != "ok":
         return '<td data-v="1e9" class="red">it ran</td>' if regressed else "<td></td>"
-    if mine is None or mine.worsening is None:
-        text = "new" if mine is None or mine.before is None else "figure gone"
+    if mine is None:
+        return f'<td data-v="-">{"new" if new else ""}</td>'
+    if mine.worsening is None:
+        text = "figure new" if mine.before is None else "figure gone"
         return f'<td data-v="-">{text}</td>'
     red = ' class="red"' if regressed else ""
     return f'<td data-v="{mine.worsening:.4g}"{red}>{esc(wording.moved(mine.worsening))}</td>'
@@ -169,6 +176,6 @@ def _change_cell(r: Result, changes: Sequence[Change], metric: str, regressed: b
 def _remark(r: Result) -> str:
     if r.status != "ok":
         return wording.state_text(r)
-    texts = [wording.bar_text(bar) for bar in r.bars if not bar.passed]
+    texts = [wording.bar_text(bar, r) for bar in r.bars if not bar.passed]
     texts += ["damaged log"] * r.damaged
     return "; ".join(texts)

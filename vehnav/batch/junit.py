@@ -156,7 +156,7 @@ def _bar(r: Result, bar: BarResult, name: str) -> Case:
     if bar.passed:
         return Case(name)
     report = f"\nreport: {r.report}" if r.report else ""
-    return Case(name, "failure", "bar", f"{r.name}: {wording.bar_text(bar)}{report}")
+    return Case(name, "failure", "bar", f"{r.name}: {wording.bar_text(bar, r)}{report}")
 
 
 def _regression_cases(item: Comparison) -> list[Case]:

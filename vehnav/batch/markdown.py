@@ -200,7 +200,8 @@ def _logs(
         row = [*(cell(text) for text in texts), _bars(r)]
         if comparison is not None:
             change = changes.get((r.log, r.config))
-            row.append(_changed(change) if r.status == "ok" else "")
+            new = r.name in comparison.new
+            row.append(_changed(change, new=new) if r.status == "ok" else "")
         if base is not None:
             row.append(_link(r, base))
         line = f"| {' | '.join(row)} |"
@@ -225,13 +226,13 @@ def _bars(r: Result) -> str:
         return f"**{wording.STATES[r.status]}**{reason}"
     far = [bar for bar in r.bars if not bar.passed]
     if far:
-        return "<br>".join(f"**missed**: {cell(wording.bar_text(bar))}" for bar in far[:5])
+        return "<br>".join(f"**missed**: {cell(wording.bar_text(bar, r))}" for bar in far[:5])
     return f"{len(r.bars)} passed" if r.bars else "none"
 
 
-def _changed(change: Change | None) -> str:
+def _changed(change: Change | None, *, new: bool) -> str:
     if change is None:
-        return "new"
+        return "new" if new else ""
     if change.worsening is None:
         return "figure gone" if change.now is None else "figure new"
     text = cell(wording.moved(change.worsening))

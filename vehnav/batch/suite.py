@@ -39,6 +39,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final, Literal
 
+from vehnav.batch.bar_scopes import check_scopes
 from vehnav.batch.fields import check_keys, fraction_of, hints, nearest, size_of, value_of
 from vehnav.batch.metric_paths import check_metric
 from vehnav.batch.model import METRICS, Bound
@@ -177,10 +178,17 @@ def load_suite(path: str | Path) -> Suite:
         not there and not optional; a bar that is for nothing.
     """
     path = Path(path)
+    if path.is_dir():
+        raise ConfigError(
+            f"{path}: a folder; vehnav score --init {path} writes a suite of its logs"
+        )
     try:
         content = tomllib.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
-        raise ConfigError(f"{path}: cannot be read: {error.strerror or error}") from error
+        raise ConfigError(
+            f"{path}: cannot be read: {error.strerror or error}; vehnav score --init DIR writes a "
+            "first suite from the logs in a folder"
+        ) from error
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise ConfigError(f"{path}: not a TOML file: {error}") from error
     check_keys(content, TABLES, str(path))
@@ -207,18 +215,9 @@ def load_suite(path: str | Path) -> Suite:
         skipped=tuple(skipped),
         **head,
     )
-    _check_bars(suite)
+    if not skipped:  # a bar may be for what is not there
+        check_scopes(suite.bars, suite.matrix(), str(path))
     return suite
-
-
-def _check_bars(suite: Suite) -> None:
-    """ConfigError for a bar that is for no log and configuration of the suite."""
-    pairs = [(log.group, log.name, config.name) for log, config in suite.matrix()]
-    for bar in suite.bars:
-        if not any(bar.applies(*pair) for pair in pairs) and not suite.skipped:
-            scope = {"group": bar.group, "log": bar.log, "config": bar.config}
-            named = ", ".join(f"{key} {name!r}" for key, name in scope.items() if name is not None)
-            raise ConfigError(f"{suite.path}: [[bar]] {bar.metric}: there is no {named}")
 
 
 # ---- tables ------------------------------------------------------------------------------------
@@ -246,7 +245,7 @@ def _table(content: Mapping[str, Any], name: str, path: Path) -> dict[str, Any]:
 def _head(table: Mapping[str, Any], where: str) -> dict[str, Any]:
     check_keys(table, ("name", "time_limit", "memory_limit", "keep"), where)
     if "name" not in table:
-        raise ConfigError(f"{where}: no name")
+        raise ConfigError(f'{where}: no name; a suite begins with [suite] name = "..."')
     limit = table.get("time_limit")
     seconds = None if limit is None else value_of(limit, float, f"{where} time_limit")
     if seconds is not None and seconds <= 0.0:

@@ -85,11 +85,18 @@ def moved(worsening: float) -> str:
 # ---- sentences ---------------------------------------------------------------------------------
 
 
-def bar_text(bar: BarResult) -> str:
-    """What was found and what was allowed."""
+def bar_text(bar: BarResult, result: Result) -> str:
+    """What was found in a log and what was allowed."""
     bound = "at most" if bar.bound == "max" else "at least"
-    found = with_unit(bar.value, bar.metric)
+    found = undefined(bar, result) if bar.value is None else with_unit(bar.value, bar.metric)
     return f"{bar.metric} is {found}, {bound} {with_unit(bar.limit, bar.metric)} is allowed"
+
+
+def undefined(bar: BarResult, result: Result) -> str:
+    """That a figure is not there, and why where that is known."""
+    if bar.metric.startswith("errors.") and result.metrics.get("gps.fixes_judged") == 0.0:
+        return "undefined (no GPS fix is left to judge)"
+    return "undefined"
 
 
 def state_text(result: Result) -> str:

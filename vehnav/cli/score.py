@@ -34,6 +34,8 @@ if TYPE_CHECKING:
 
 
 INDEX_NAME: Final = "index.html"
+LEFT_OUT: Final = 20
+"""Files that are no logs, named one by one; a folder of pictures would fill the screen."""
 
 
 class SizeType(ParamType):
@@ -141,10 +143,7 @@ def score(suite: str | None, as_json: bool, quiet: bool, **options: Any) -> None
         raise click.UsageError("SUITE.toml is needed; --init DIR writes the first one")
     loaded, out = _suite(suite, options)
     baseline = _baseline(loaded, options)
-    for path in options["tables"]:
-        from vehnav.batch.tables import check_table
-
-        check_table(Path(path))
+    _check_files(loaded, out, options)
     for text in loaded.skipped:
         click.echo(f"skipped: {text}", err=True)
     results = _run(loaded, out, options, quiet=quiet or as_json)
@@ -171,8 +170,11 @@ def _init(folder: str, *, as_json: bool) -> None:
         left_out = [{"path": row.path, "reason": row.reason} for row in made.left_out]
         print_json({"suite": str(made.path), "logs": found, "left_out": left_out})
         return
-    for row in made.left_out:
+    for row in made.left_out[:LEFT_OUT]:
         click.echo(f"left out: {row.path}: {row.reason}", err=True)
+    if len(made.left_out) > LEFT_OUT:
+        more = len(made.left_out) - LEFT_OUT
+        click.echo(f"left out: {more} more, all named by --json", err=True)
     count = len(made.found)
     click.echo(
         f"{made.path}: {count} log{'s' if count > 1 else ''}; next: vehnav score {made.path}"
@@ -209,6 +211,20 @@ def _baseline(suite: Suite, options: dict[str, Any]) -> Baseline | None:
     if path is None or (options["update_baseline"] and not path.exists()):
         return None
     return read_baseline(path)
+
+
+def _check_files(suite: Suite, out: Path, options: dict[str, Any]) -> None:
+    """ConfigError for a file that could not be written when everything has run."""
+    from vehnav.batch.tables import check_table
+
+    for path in options["tables"]:
+        check_table(Path(path))
+    files = [options["junit"], options["markdown"], *options["tables"]]
+    if options["update_baseline"]:
+        files.append(_baseline_path(suite, options))
+    for file in map(Path, filter(None, files)):
+        if not file.parent.is_dir() and file.parent.resolve() != out.resolve():
+            raise ConfigError(f"{file}: there is no folder {file.parent}; make it first")
 
 
 def _run(suite: Suite, out: Path, options: dict[str, Any], *, quiet: bool) -> Results:

@@ -157,5 +157,7 @@ def _bar(row: Result) -> str:
     first = missed[0]
     sign = ">" if first.bound == "max" else "<"
     more = f" and {len(missed) - 1} more" if len(missed) > 1 else ""
+    if first.value is None:
+        return f"MISSED {first.metric}: {wording.undefined(first, row)}{more}"
     value = wording.short(first.value)
     return f"MISSED {first.metric} {value} {sign} {wording.short(first.limit)}{more}"
