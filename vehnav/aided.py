@@ -31,7 +31,9 @@ from vehnav.units import DEG, NS
 Array = npt.NDArray[np.float64]
 
 VETO_SPEED: Final = 1.0
-"""m/s of GPS, in the median over a stop, that make it none (spec C 1)."""
+"""m/s of GPS over a stop that make it none (spec C 1)."""
+VETO_SIGMAS: Final = 3.0
+"""Of the scatter of what GPS shows in a stop, by which it must stand out of its own noise."""
 FEW_FIXES: Final = 3
 """Fixes below which GPS gives no start."""
 
@@ -188,12 +190,8 @@ def _veto_stops(drive: Drive, fixes: Fixes | None) -> tuple[Drive, list[Finding]
     if fixes is None:
         return drive, []
     v = fixes.velocity(drive.earth)
-    speed = np.hypot(v[:, 0], v[:, 1])
-    kept = []
-    for stop in drive.stops:
-        inside = (fixes.t >= stop.start) & (fixes.t <= stop.end)
-        if not np.any(inside) or float(np.median(speed[inside])) < VETO_SPEED:
-            kept.append(stop)
+    inside = [v[(fixes.t >= stop.start) & (fixes.t <= stop.end)] for stop in drive.stops]
+    kept = [stop for stop, of_stop in zip(drive.stops, inside, strict=True) if not _moves(of_stop)]
     if len(kept) == len(drive.stops):
         return drive, []
     text = (
@@ -201,6 +199,19 @@ def _veto_stops(drive: Drive, fixes: Fixes | None) -> tuple[Drive, list[Finding]
         f"{VETO_SPEED:g} m/s in them"
     )
     return replace(drive, stops=kept), [Finding("stop-vetoed", "warning", text)]
+
+
+def _moves(v: Array) -> bool:
+    """Whether velocities (k, 2) of fixes are those of motion, not of noise.
+
+    Noise differs from fix to fix, motion does not: the mean product of neighbouring velocities is
+    the square of the speed without that of the noise.
+    """
+    if v.shape[0] < FEW_FIXES:
+        return bool(v.size) and float(np.median(np.hypot(v[:, 0], v[:, 1]))) > VETO_SPEED
+    products = np.sum(v[1:] * v[:-1], axis=1)
+    mean, scatter = float(np.mean(products)), float(np.std(products)) / np.sqrt(products.size)
+    return bool(mean > max(VETO_SPEED**2, VETO_SIGMAS * scatter))
 
 
 def _speed(log: Log, config: Config, origin: int) -> tuple[Array, Array] | None:
@@ -272,6 +283,12 @@ def _findings(
     findings = [
         Finding("filter-tuning", "info", f"filter noise of {tuning.name} grade ({tuning.reason})")
     ]
+    if result.fix_sigma is not None:
+        text = (
+            f"the fixes come without sigmas: {result.fix_sigma:.1f} m per horizontal axis by the "
+            "innovations of a first run (0.4 m at least)"
+        )
+        findings.append(Finding("gps-sigma", "info", text))
     for name, row in result.innovations.items():
         text = (
             f"{name}: {row.used} used, {row.inflated} weighed down, {row.rejected} rejected; mean "

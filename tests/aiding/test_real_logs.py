@@ -43,8 +43,8 @@ def percent(found):
 @pytest.mark.parametrize(
     ("name", "method", "worst", "end"),
     [
-        ("boston", "filter", 0.8, 0.5),
-        ("boston", "smooth", 0.65, 0.5),
+        ("boston", "filter", 0.85, 0.3),
+        ("boston", "smooth", 0.62, 0.3),
         ("0708", "filter", 1.8, 1.0),
         ("0708", "smooth", 1.2, 1.0),
         ("0042", "filter", 0.4, 0.4),
@@ -108,22 +108,18 @@ def inside(log, axes, reference, method, cuts):
 @pytest.mark.slow
 @pytest.mark.parametrize("method", ["filter", "smooth"])
 def test_share_of_real_errors_inside_the_circles(logs, method):
-    """Two drives, GPS that ends at many times: 2 sigma within 8 points of 86 %, 3 sigma 5 of 99 %.
+    """Two drives, GPS that ends every minute: within 10 points of what Rayleigh's law wants.
 
-    Inside 1 sigma there is too much (39 % wanted, 46 to 54 seen): most stretches are better than
-    their sigma, few much worse, as the shaking of a gyro comes and goes. The errors of one drive
-    hang together over minutes, so a single stretch may be far off to either side.
+    The errors of one drive hang together over minutes, so a single stretch may be far off to
+    either side.
     """
     shares = []
     for name, reference in REFERENCE.items():
         log, axes = logs[name]
         end = 700 if name == "boston" else 530
         for cuts in (
-            [f"{a}:{a + 60}" for a in range(100, end - 60, 120)],
-            [f"{a}:{end + 100}" for a in range(100, end - 60, 120)],
+            [f"{a}:{a + 60}" for a in range(100, end - 60, 60)],
+            [f"{a}:{end + 100}" for a in range(100, end - 60, 60)],
         ):
             shares.append(inside(log, axes, reference, method, cuts))
-    one, two, three = np.mean(shares, axis=0)
-    assert one == pytest.approx(0.39, abs=0.16)
-    assert two == pytest.approx(0.86, abs=0.08)
-    assert three == pytest.approx(0.99, abs=0.05)
+    assert np.mean(shares, axis=0) == pytest.approx([0.39, 0.86, 0.99], abs=0.10)

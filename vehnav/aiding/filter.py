@@ -71,6 +71,13 @@ class Aids:
     shaken: Array
     skewed: Array
 
+    def part(self, m: int) -> Aids:
+        """Those of the first ``m`` epochs."""
+        return replace(
+            self, epochs=self.epochs[:m], stopped=self.stopped[:m], speed=self.speed[:m],
+            fix=self.fix[:m], shaken=self.shaken[:m], skewed=self.skewed[:m],
+        )  # fmt: skip
+
 
 @dataclass(frozen=True)
 class FilterStart:

@@ -18,6 +18,7 @@ from vehnav.aiding.filter import (
     Innovations,
     run_filter,
 )
+from vehnav.aiding.fix_noise import measured_sigma, with_sigma
 from vehnav.aiding.fixes import Fixes
 from vehnav.aiding.gaps import bridge_gaps
 from vehnav.aiding.smoother import Smoothed, smoothed_errors, take_errors_off
@@ -95,6 +96,8 @@ class LandResult:
         Last estimate of the parameter row.
     parameter_sigmas : (14,)
     tuning : Tuning
+    fix_sigma : float or None
+        m, per horizontal axis, of fixes that came without, where their innovations tell.
     """
 
     outcome: Outcome
@@ -102,6 +105,7 @@ class LandResult:
     parameters: Array
     parameter_sigmas: Array
     tuning: Tuning
+    fix_sigma: float | None = None
 
 
 def tuning_from_log(drive: Drive, *, tactical: bool | None = None) -> Tuning:
@@ -169,10 +173,15 @@ def run_land(
     increments, gaps = bridge_gaps(part, drive.omega[start.first :], rates)
     stopped = stopped_mask(drive.t.size, drive.stops)[start.first :]
     aids = put_to_epochs(increments.t, stopped, fixes, speed, use, drive)
+    begin, fix_sigma = _filter_start(start, tuning), None
+    if fixes is not None and fixes.sigma_pos is None:
+        fix_sigma = measured_sigma(
+            increments, gaps, aids, begin, noise=tuning.noise, earth=drive.earth
+        )
+        aids = aids if fix_sigma is None else with_sigma(aids, fix_sigma)
     forward = run_filter(
-        increments, gaps, aids, _filter_start(start, tuning), noise=tuning.noise,
-        absolute=absolute, earth=drive.earth,
-    )  # fmt: skip
+        increments, gaps, aids, begin, noise=tuning.noise, absolute=absolute, earth=drive.earth
+    )
     innovations, records = forward.innovations, _records(drive, start, aids, forward)
     final: Filtered | Smoothed = forward
     if smooth:
@@ -182,7 +191,8 @@ def run_land(
     del forward  # rows of an hour twice are too much
     outcome = _outcome(start, increments.t, aids, final, records)
     sigmas = final.parameter_sigmas
-    return LandResult(outcome, innovations, final.parameters[-1].copy(), sigmas, tuning)
+    parameters = final.parameters[-1].copy()
+    return LandResult(outcome, innovations, parameters, sigmas, tuning, fix_sigma)
 
 
 def put_to_epochs(
