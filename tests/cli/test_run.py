@@ -115,9 +115,19 @@ def test_outputs_by_suffix_and_rate(drive, tmp_path) -> None:
     assert result.stdout == ""
     assert all(path.stat().st_size > 0 for path in outputs)
     assert len((tmp_path / "track.tum").read_text().splitlines()) == pytest.approx(801, abs=1)
-    wrong = vehnav("run", drive, "-o", tmp_path / "track.docx", "--out-dir", tmp_path / "q")
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [("track.docx", ".docx"), ("results", "--out-dir"), ("no/track.csv", "no folder")],
+)
+def test_outputs_that_cannot_be_written_are_refused_before_the_work(
+    drive, tmp_path, name, said
+) -> None:
+    wrong = vehnav("run", drive, "-o", tmp_path / name, "--out-dir", tmp_path / "q")
     assert wrong.exit_code == 2
-    assert ".docx" in wrong.stderr
+    assert said in wrong.stderr
+    assert not (tmp_path / "q").exists()
 
 
 def test_two_logs_get_a_folder_each(drive, tmp_path) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shlex
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -213,6 +213,7 @@ def run(
     """
     if len(logs) > 1 and (options["outputs"] or options["out_dir"]):
         raise ConfigError("-o and --out-dir name one result; give one log at a time with them")
+    _check_outputs(options["outputs"])
     documents: list[dict[str, Any]] = []
     findings: list[Finding] = []
     damaged = False
@@ -228,6 +229,19 @@ def run(
     if as_json:
         print_json(documents[0] if len(documents) == 1 else {"runs": documents})
     finish(damaged=damaged, strict=strict, findings=findings)
+
+
+def _check_outputs(paths: Sequence[str]) -> None:
+    """Refuse before the work what could not be written after it."""
+    from vehnav.export.formats import format_of
+
+    for path in paths:
+        if Path(path).suffix == "" or Path(path).is_dir():
+            raise ConfigError(f"-o {path}: is no file name with a suffix; a folder is --out-dir")
+        if Path(path).suffix not in (".json", ".html"):
+            format_of(path)
+        if not Path(path).parent.is_dir():
+            raise ConfigError(f"-o {path}: there is no folder {Path(path).parent}")
 
 
 def _results(
