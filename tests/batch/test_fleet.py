@@ -5,11 +5,18 @@ from __future__ import annotations
 import json
 import os
 import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
 from vehnav.batch import fleet, runner
+from vehnav.batch.fence import WorkerError
+from vehnav.batch.model import read_results
 from vehnav.batch.runner import run_suite, save
 from vehnav.batch.suite import Suite, load_suite
 from vehnav.batch.task import Task, code_digest
@@ -105,11 +112,81 @@ def test_nothing_is_lost_where_a_worker_is_killed(tmp_path, monkeypatch) -> None
     compare_with_this_process(suite, tmp_path, monkeypatch, code)
 
 
+@pytest.fixture
+def fleet_of_processes(tmp_path) -> Iterator[tuple[str, subprocess.Popen[bytes]]]:
+    """The address of a scheduler with a worker, and its process."""
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        address = f"tcp://127.0.0.1:{free.getsockname()[1]}"
+
+    def started(name: str, *arguments: str) -> subprocess.Popen[bytes]:
+        return subprocess.Popen(
+            [sys.executable, "-m", f"distributed.cli.{name}", *arguments, "--no-dashboard"],
+            stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, cwd=tmp_path,
+        )  # fmt: skip
+
+    host, port = address.removeprefix("tcp://").split(":")
+    processes = [
+        started("dask_scheduler", "--host", host, "--port", port),
+        started("dask_worker", address, "--nthreads", "1", "--no-nanny"),
+    ]
+    yield address, processes[0]
+    for process in processes:
+        process.kill()
+        process.wait()
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform == "win32", reason="stops a process as Unix does")
+@pytest.mark.parametrize("how", ["SIGKILL", "SIGSTOP"])
+def test_a_scheduler_that_goes_away_ends_the_suite_soon(
+    tmp_path, monkeypatch, fleet_of_processes, how: str
+) -> None:
+    """Killed, its connections break; stopped, they stay and say nothing."""
+    monkeypatch.setattr(fleet, "WATCH_SECONDS", 0.5)
+    monkeypatch.setattr(fleet, "ANSWER_SECONDS", 2.0)
+    address, scheduler = fleet_of_processes
+    out = tmp_path / "there"
+    gone: list[float] = []
+
+    def end(done: int) -> None:
+        if done == 2:
+            scheduler.send_signal(getattr(signal, how))
+            gone.append(time.monotonic())
+
+    with pytest.raises(WorkerError, match=r"went away or answers no more.*--resume goes on"):
+        run_suite(suite_of(tmp_path, 30), out, scheduler=address, advance=end)
+    assert time.monotonic() - gone[0] < 15.0  # a question, its answer, 5 s to hang up; room
+    results = read_results(out / "results.json")
+    states = [r.status for r in results.results]
+    assert not results.run.complete
+    assert states.count("interrupted") >= 20
+    assert len(states) - states.count("interrupted") >= 2
+    assert list(out.glob(".shared-*")) == []
+
+
+class Lost:
+    """A future whose result was there and can no longer be fetched."""
+
+    status = "finished"
+
+    def result(self) -> dict[str, object]:
+        raise distributed.comm.CommClosedError("in <TCP>: Stream is closed")
+
+
+def test_a_connection_that_breaks_while_a_result_is_fetched() -> None:
+    with pytest.raises(WorkerError, match="went away"):
+        fleet._answer(Lost())
+
+
 def test_no_scheduler_and_no_worker(tmp_path, monkeypatch) -> None:
     monkeypatch.setattr(fleet, "CONNECT_SECONDS", 1.0)
     suite = suite_of(tmp_path, 1)
     with pytest.raises(ConfigError, match=r"tcp://127.0.0.1:9: no Dask scheduler answers"):
         run_suite(suite, tmp_path / "out", scheduler="tcp://127.0.0.1:9")
+    for address in ("nohost", "no://where:1"):  # said at once
+        with pytest.raises(ConfigError, match=f"{address}: no Dask scheduler answers"):
+            run_suite(suite, tmp_path / "out", scheduler=address)
     assert not (tmp_path / "out" / "results.json").exists()
     with cluster(0, processes=False) as there, pytest.raises(ConfigError, match="no workers"):
         run_suite(suite, tmp_path / "out", scheduler=there.scheduler_address)

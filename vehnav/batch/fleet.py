@@ -7,6 +7,7 @@ at a time, so that a suite of any size is no burden for it.
 
 from __future__ import annotations
 
+import logging
 import os
 import threading
 import uuid
@@ -21,6 +22,12 @@ from vehnav.errors import ConfigError
 
 CONNECT_SECONDS: Final = 30.0
 """To find the scheduler, and its first worker."""
+WATCH_SECONDS: Final = 10.0
+"""Between two questions to the scheduler whether it is still there."""
+ANSWER_SECONDS: Final = 60.0
+"""For its answer; it may be busy."""
+LOUD: Final = ("distributed.client", "distributed.core", "distributed.comm")
+"""Their tracebacks of a lost connection would hide the sentence that says it."""
 IN_FLIGHT: Final = 3
 """Tasks for each thread of the cluster that the scheduler knows of at a time."""
 
@@ -65,7 +72,8 @@ def fleet_answers(
         def send() -> None:
             task = next(left, None)
             if task is not None:
-                future = client.submit(score_here, task.to_dict(), **options, pure=False)
+                with _gone():
+                    future = client.submit(score_here, task.to_dict(), **options, pure=False)
                 sent[future.key] = task
                 running.add(future)
 
@@ -77,7 +85,8 @@ def fleet_answers(
             future.release()
             send()
             yield task, answer
-        client.run(close_fences)
+        with suppress(OSError, TimeoutError):  # they leave by themselves in the end
+            client.run(close_fences)
 
 
 def _distributed() -> Any:
@@ -91,7 +100,10 @@ def _distributed() -> Any:
 @contextmanager
 def _connected(distributed: Any, address: str) -> Iterator[Any]:
     """A client of the cluster; ConfigError where there is none or it has no worker."""
+    for name in LOUD:
+        logging.getLogger(name).setLevel(logging.CRITICAL)
     try:
+        distributed.comm.resolve_address(address)  # a client without an address hangs in its end
         client = distributed.Client(address, timeout=CONNECT_SECONDS, set_as_default=False)
     except (OSError, TimeoutError, ValueError) as error:
         raise ConfigError(f"{address}: no Dask scheduler answers: {error}") from error
@@ -100,9 +112,40 @@ def _connected(distributed: Any, address: str) -> Iterator[Any]:
             client.wait_for_workers(1, timeout=CONNECT_SECONDS)
         except TimeoutError:
             raise ConfigError(f"{address}: the scheduler has no workers") from None
-        yield client
+        with _watched(client):
+            yield client
     finally:
-        client.close(timeout=5)
+        with suppress(TimeoutError, OSError):  # the scheduler may be gone
+            client.close(timeout=5)
+
+
+@contextmanager
+def _watched(client: Any) -> Iterator[None]:
+    """Where the scheduler answers no more, hang up: all that waits for it ends.
+
+    A scheduler that is stopped, or whose machine is cut off, keeps its connections otherwise.
+    """
+    done = threading.Event()
+    address = client.scheduler.address
+
+    def hang_up() -> None:
+        client.rpc.remove(address)
+        if client.scheduler_comm is not None:
+            client.scheduler_comm.comm.abort()
+
+    def watch() -> None:
+        while not done.wait(WATCH_SECONDS):
+            try:
+                client.sync(client.scheduler.identity, callback_timeout=ANSWER_SECONDS)
+            except Exception:
+                client.loop.add_callback(hang_up)
+                return
+
+    threading.Thread(target=watch, daemon=True).start()
+    try:
+        yield
+    finally:
+        done.set()
 
 
 def _threads(client: Any) -> int:
@@ -125,14 +168,26 @@ def _token(task: Task) -> Iterator[str]:
 
 def _answer(future: Any) -> dict[str, Any]:
     """What came back; errors of the cluster itself end the suite."""
-    if future.status in ("cancelled", "lost"):
-        raise WorkerError("the Dask cluster went away; what was done is kept, --resume goes on")
     if future.status == "error":
         error = future.exception()
         if type(error).__name__ != "KilledWorker":
             raise WorkerError(f"a worker of the cluster failed: {type(error).__name__}: {error}")
         return {"status": "crash", "error": "the workers of the cluster that tried it died"}
-    return answer_of(future.result())
+    with _gone():
+        answer = future.result()  # cancelled, or the line was cut while it was fetched
+    return answer_of(answer)
+
+
+@contextmanager
+def _gone() -> Iterator[None]:
+    """What fails between here and the scheduler, in one sentence."""
+    try:
+        yield
+    except Exception as error:
+        raise WorkerError(
+            "the scheduler of the Dask cluster went away or answers no more; what was done is "
+            "kept, --resume goes on"
+        ) from error
 
 
 def answer_of(answer: dict[str, Any]) -> dict[str, Any]:
