@@ -62,9 +62,20 @@ def without_run(path: Path) -> bytes:
 # ---- what it finds -----------------------------------------------------------------------------
 
 
+def one_after_the_other(tasks, limits, *, jobs):
+    """Without worker processes: what they do is the same."""
+    for task in tasks:
+        yield task, json.loads(json.dumps(score(Task(**json.loads(json.dumps(task.to_dict()))))))
+
+
+@pytest.fixture
+def in_this_process(monkeypatch) -> None:
+    monkeypatch.setattr(runner, "local_answers", one_after_the_other)
+
+
 @pytest.fixture(scope="module")
 def matrix(tmp_path_factory) -> tuple[Suite, Path, Path]:
-    """Good logs and a bad one, two configurations; run by one worker and by two."""
+    """Good logs and a bad one, two configurations; one after the other, and by two workers."""
     folder = tmp_path_factory.mktemp("matrix")
     (folder / "broken.csv").write_text("this,is\nno,log\n")
     Simulation(DRIVE, rate=50.0).write(folder / "city.mcap")
@@ -81,7 +92,9 @@ def matrix(tmp_path_factory) -> tuple[Suite, Path, Path]:
     )
     code = code_digest.__wrapped__()
     one, two = folder / "one", folder / "two"
-    save(run_suite(suite, one, jobs=1), one)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(runner, "local_answers", one_after_the_other)
+        save(run_suite(suite, one), one)
     save(run_suite(suite, two, jobs=2), two)
     if code != code_digest.__wrapped__():
         pytest.skip("somebody edited vehnav while the suite ran")
@@ -143,20 +156,6 @@ def test_reports_lie_where_the_results_say(matrix) -> None:
             assert (page.parent / "report.json").is_file()
         else:
             assert result.report is None
-
-
-@pytest.fixture
-def in_this_process(monkeypatch) -> None:
-    """Without worker processes: what they do is the same."""
-
-    def answers(tasks, limits, *, jobs):
-        for task in tasks:
-            yield (
-                task,
-                json.loads(json.dumps(score(Task(**json.loads(json.dumps(task.to_dict())))))),
-            )
-
-    monkeypatch.setattr(runner, "local_answers", answers)
 
 
 @pytest.mark.usefixtures("in_this_process")
@@ -267,8 +266,8 @@ def test_killed_hanging_and_greedy_logs_fail_alone(tmp_path) -> None:
     os.mkfifo(tmp_path / "killed.mcap")
     before = set(children())
     long = "[[log]]\nscenario = 'town,duration=900'\nrate = 200\nname = 'greedy'\n"
-    text = listed("killed.mcap") + listed("hangs.mcap", "name = 'hangs'") + long + simulated()
-    suite = replace(loaded(tmp_path, text + QUICK), time_limit=5.0, memory_limit=40 * 2**20)
+    text = listed("killed.mcap") + listed("hangs.mcap", "name = 'hangs'") + simulated() + long
+    suite = replace(loaded(tmp_path, text + QUICK), time_limit=3.0, memory_limit=40 * 2**20)
 
     def kill_the_first() -> None:
         """The only worker, as soon as it has opened the log."""
@@ -284,7 +283,7 @@ def test_killed_hanging_and_greedy_logs_fail_alone(tmp_path) -> None:
     found = {r.log: (r.status, r.error) for r in results.results}
     assert found == {
         "killed": ("crash", "its process was ended by SIGKILL (out of memory?)"),
-        "hangs": ("timeout", "over the time limit of 5 s"),
+        "hangs": ("timeout", "over the time limit of 3 s"),
         "greedy": ("crash", "out of memory; see the memory limit"),
         "city": ("ok", None),
     }
