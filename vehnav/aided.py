@@ -279,22 +279,7 @@ def _gps_use(
 def _findings(
     start: CoarseStart, result: LandResult, fixes: Fixes | None, given: Given
 ) -> list[Finding]:
-    tuning = result.tuning
-    findings = [
-        Finding("filter-tuning", "info", f"filter noise of {tuning.name} grade ({tuning.reason})")
-    ]
-    if result.fix_sigma is not None:
-        text = (
-            f"the fixes come without sigmas: {result.fix_sigma:.1f} m per horizontal axis by the "
-            "innovations of a first run (0.4 m at least)"
-        )
-        findings.append(Finding("gps-sigma", "info", text))
-    for name, row in result.innovations.items():
-        text = (
-            f"{name}: {row.used} used, {row.inflated} weighed down, {row.rejected} rejected; mean "
-            f"normalised innovation squared {row.mean_nis:.2f}"
-        )
-        findings.append(Finding("filter-innovations", "info", text))
+    findings: list[Finding] = []
     sigmas = result.outcome.sigma_heading
     if start.compassed and sigmas is not None:
         last = float(sigmas[-1]) / DEG

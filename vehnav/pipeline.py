@@ -16,6 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from vehnav.aided import agreement_with_gps, judge_aided, outage_intervals, run_aided
+from vehnav.aiding.land import LandResult
 from vehnav.choices import (
     METHODS,
     check_levelling_rate,
@@ -124,6 +125,8 @@ class Run:
     agreement : Errors or None
         With ``--gps aid``: how far the track is from all fixes. Most of them aided, so this is no
         error of the track.
+    aided : LandResult or None
+        With a filter method: its noise, innovations and parameters.
     """
 
     log: Log
@@ -141,6 +144,7 @@ class Run:
     noise: LegNoise | None
     findings: tuple[Finding, ...]
     agreement: Errors | None = None
+    aided: LandResult | None = None
 
     @property
     def axes(self) -> str:
@@ -222,6 +226,7 @@ def _run_filter(drive: Drive, log: Log, config: Config, samples: Samples) -> Run
     return Run(
         log, config, samples.orientation, trajectory, aided.stops, aided.outcome.records,
         aided.alignment, aided.gps, errors, None, {}, {}, None, tuple(findings), agreement,
+        aided.result,
     )  # fmt: skip
 
 

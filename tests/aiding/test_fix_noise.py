@@ -47,13 +47,6 @@ def test_logged_sigmas_are_believed():
     assert found_sigma(3.0, logged=True) is None
 
 
-def test_what_was_found_is_said():
-    log = simulate(TOWN, sensor="mems-industrial", seed=3, rate_hz=50.0, gnss=GnssModel()).log()
-    log = replace(log, gnss=replace(log.gnss, sigma_pos=None))
-    (finding,) = (f for f in run(log, Config(method="filter")).findings if f.code == "gps-sigma")
-    assert "m per horizontal axis" in finding.text
-
-
 def test_fixes_of_a_bad_receiver_veto_no_stop():
     """9 m at 1 Hz are 4 m/s over the 3 s of a difference, four times the veto's speed."""
     made = simulate(

@@ -167,20 +167,21 @@ def under_way(
     row: Array,
     par: Array,
     rate: Vec3,
+    ahead: float,
     speed: float,
     nhc: bool,
     noise: Noise,
     kept: tuple[Array, Array, Array, IntArray],
     counts: Array,
 ) -> None:
-    """Non-holonomic constraint and odometer (``speed`` NaN: none)."""
+    """Non-holonomic constraint and odometer (``speed`` NaN: none); ``ahead``: forward force."""
     v, c_wb = velocity_of(row), attitude_of(row)
     if nhc:
         forward = np.sqrt(v[0] * v[0] + v[1] * v[1])
         extra = noise.turn * abs(rate[2]) + noise.speed * forward
         z = no_side_slip(h, v, c_wb, rate, par)
         measure(NHC, x, p, h, z, (noise.side + extra) ** 2, noise, kept, counts)
-        z = no_lift(h, v, c_wb, par)
+        z = no_lift(h, v, c_wb, ahead, par)
         measure(NHC, x, p, h, z, (noise.up + extra) ** 2, noise, kept, counts)
     if not np.isnan(speed):
         z = odometer(h, v, c_wb, speed, par)

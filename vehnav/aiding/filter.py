@@ -87,9 +87,9 @@ class FilterStart:
     ----------
     row : (22,)
         Navigation row.
-    parameters : (14,)
+    parameters : (15,)
         Parameter row.
-    covariance : (23, 23)
+    covariance : (24, 24)
     """
 
     row: Array
@@ -122,15 +122,15 @@ class Filtered:
     ----------
     rows : (n, 22)
         Navigation rows at all instants from the first epoch on; at an epoch after feedback.
-    parameters : (m, 14)
+    parameters : (m, 15)
         At the epochs, after feedback.
-    covariance : (m, 23, 23)
+    covariance : (m, 24, 24)
         At the epochs, after feedback.
     fed_back : (m, 9)
         Navigation errors that were taken off at the epochs.
-    phi : (m, 9, 23)
+    phi : (m, 9, 24)
         First rows of the transition over the block before each epoch.
-    measurements : (rows (u, 23), gains (u, 23), (innovation, variance) (u, 2))
+    measurements : (rows (u, 24), gains (u, 24), (innovation, variance) (u, 2))
     until : (m,) int64
         Number of measurements applied up to and with each epoch.
     innovations : dict of str to Innovations
@@ -147,7 +147,7 @@ class Filtered:
 
     @property
     def parameter_sigmas(self) -> Array:
-        """(14,) at the last epoch, where a smoother has nothing to add."""
+        """(15,) at the last epoch, where a smoother has nothing to add."""
         return np.asarray(np.sqrt(np.diagonal(self.covariance[-1]))[9:])
 
     def light(self) -> Filtered:
@@ -215,13 +215,13 @@ def run_epochs(
     x, h, work = np.zeros(SIZE), np.zeros(SIZE), np.zeros((SIZE, SIZE))
     for e in range(epochs.shape[0]):
         b = epochs[e]
-        rate = (0.0, 0.0, 0.0)
+        rate, force = (0.0, 0.0, 0.0), (0.0, 0.0)
         if e > 0:
             a = epochs[e - 1]
             skew = (skewed[e, 0], skewed[e, 1], skewed[e, 2])
             now[:] = par
             for j in range(3):
-                now[3 + j] += par[13] * skew[j]
+                now[3 + j] += par[14] * skew[j]
             run_block(t, dtheta, dvel, coast, a, b, rows, now, absolute, earth)
             rate = mean_rate(t, dtheta, a, b, now)
             dt = t[b] - t[a]
@@ -238,8 +238,8 @@ def run_epochs(
             if stopped[e]:
                 at_rest(x, p, h, rows[b], rate, use[0], use[1], noise, kept, counts, earth)
             under_way(
-                x, p, h, rows[b], par, rate, speed[e], use[2] and not stopped[e], noise, kept,
-                counts,
+                x, p, h, rows[b], par, rate, force[1], speed[e], use[2] and not stopped[e], noise,
+                kept, counts,
             )  # fmt: skip
         if fix[e] >= 0:
             k = fix[e]

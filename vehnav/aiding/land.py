@@ -92,9 +92,9 @@ class LandResult:
     ----------
     outcome : Outcome
     innovations : dict of str to Innovations
-    parameters : (14,)
+    parameters : (15,)
         Last estimate of the parameter row.
-    parameter_sigmas : (14,)
+    parameter_sigmas : (15,)
     tuning : Tuning
     fix_sigma : float or None
         m, per horizontal axis, of fixes that came without, where their innovations tell.

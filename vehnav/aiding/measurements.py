@@ -78,14 +78,16 @@ def no_side_slip(h: Array, v: Vec3, c_wb: Mat3, rate: Vec3, par: Array) -> float
 
 
 @kernel
-def no_lift(h: Array, v: Vec3, c_wb: Mat3, par: Array) -> float:
-    """Z = v_up - p v."""
+def no_lift(h: Array, v: Vec3, c_wb: Mat3, ahead: float, par: Array) -> float:
+    """Z = v_up - (p + q f) v, f = ``ahead`` the forward specific force, m/s2."""
     h[:] = 0.0
     v_b = mat_t_vec(c_wb, v)
     body_velocity(h, 2, c_wb, 1.0)
-    body_velocity(h, 1, c_wb, -par[8])
+    rise = float(par[8] + par[13] * ahead)
+    body_velocity(h, 1, c_wb, -rise)
     h[17] = -v_b[1]
-    return v_b[2] - float(par[8]) * v_b[1]
+    h[22] = -ahead * v_b[1]
+    return v_b[2] - rise * v_b[1]
 
 
 @kernel

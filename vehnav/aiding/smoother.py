@@ -34,12 +34,12 @@ class Smoothed:
     Attributes
     ----------
     rows : (n, 22)
-    parameters : (m, 14)
+    parameters : (m, 15)
     covariance : (m, 9, 9)
         Of position, velocity and attitude.
-    parameter_sigmas : (14,)
+    parameter_sigmas : (15,)
         At the last epoch.
-    errors : (m, 23)
+    errors : (m, 24)
         Smoothed error of the filter's states, as taken off.
     """
 
@@ -93,7 +93,7 @@ def run_back(
 
 
 def smoothed_errors(forward: Filtered) -> tuple[Array, Array]:
-    """Run back: errors (m, 23) of the filter's states, covariance (m, 9, 9) of what remains."""
+    """Run back: errors (m, 24) of the filter's states, covariance (m, 9, 9) of what remains."""
     m = forward.until.size
     errors, covariance = np.zeros((m, SIZE)), np.zeros((m, NAVIGATION, NAVIGATION))
     run_back(

@@ -4,14 +4,16 @@ A car moves along its own forward axis, up to small constants that the filter fi
 body axes right-forward-up, at the sensor, with the speed v along the body's forward axis::
 
     v_right = mu v - l omega_up + k v^2 omega_up
-    v_up    = p v
+    v_up    = (p + q f) v
 
 mu, p: the direction of travel lies to the right and above of the forward axis of the body frame as
-it was mounted; l: the sensor sits in front of the axle that does not slide; k: tyre slip. What
-remains is correlated over seconds; as white noise at 10 Hz it gets a larger sigma that carries the
-same information. The odometer reads ``(1 + kappa) v``. The gyro reads, besides its biases, ``c s``
-about each axis, s the skew of its vibration (:mod:`vehnav.aiding.vibration`) and c the share that
-it loses of it (negative). As everywhere the error states are estimate minus truth.
+it was mounted; l: the sensor sits in front of the axle that does not slide; k: tyre slip; q: the
+sprung body rises at the nose under the forward specific force f (squat; negative q), and the way
+does not follow it. What remains is correlated over seconds; as white noise at 10 Hz it gets a
+larger sigma that carries the same information. The odometer reads ``(1 + kappa) v``. The gyro
+reads, besides its biases, ``c s`` about each axis, s the skew of its vibration
+(:mod:`vehnav.aiding.vibration`) and c the share that it loses of it (negative). As everywhere the
+error states are estimate minus truth.
 """
 
 from __future__ import annotations
@@ -33,10 +35,11 @@ LEVER: Final = 18
 GYRO_SCALE: Final = 19
 SLIP: Final = 20
 ACCEL_SCALE: Final = 21
-CUT: Final = 22
-SIZE: Final = 23
+SQUAT: Final = 22
+CUT: Final = 23
+SIZE: Final = 24
 """Number of states: 15 of the error model, kappa, mu, p, l, gyro z scale, k, the scale of the
-forward accelerometer, and the share that the gyro loses of lopsided vibration."""
+forward accelerometer, q, and the share that the gyro loses of lopsided vibration."""
 
 
 class Noise(NamedTuple):
@@ -103,8 +106,8 @@ class Prior:
         m, wander axes.
     gyro, accel : float
         rad/s, m/s2, of the biases that remain.
-    odometer, mount, lever, gyro_scale, accel_scale, slip, cut : float
-        1, rad, m, 1, 1, s2/m, 1.
+    odometer, mount, lever, gyro_scale, accel_scale, slip, squat, cut : float
+        1, rad, m, 1, 1, s2/m, rad per m/s2 (0.3 deg: a soft car), 1.
     """
 
     tilt: float
@@ -119,10 +122,11 @@ class Prior:
     gyro_scale: float = 0.005
     accel_scale: float = 0.02
     slip: float = 0.004
+    squat: float = 0.005
     cut: float = 0.15
 
     def covariance(self) -> Array:
-        """P (23, 23) at the start."""
+        """P (24, 24) at the start."""
         sigma = np.array(
             [
                 *self.position,
@@ -139,6 +143,7 @@ class Prior:
                 self.gyro_scale,
                 self.slip,
                 self.accel_scale,
+                self.squat,
                 self.cut,
             ]
         )

@@ -92,11 +92,11 @@ def noise() -> Noise:
 
 
 def prior() -> Array:
-    """P (23, 23): 1 m, 0.05 m/s, 0.05 deg, 0.5 deg of heading and the biases; no vehicle."""
+    """P (24, 24): 1 m, 0.05 m/s, 0.05 deg, 0.5 deg of heading and the biases; no vehicle."""
     known = Prior(
         tilt=0.05 * DEG, heading=0.5 * DEG, velocity=0.05, position=(1.0, 1.0, 1.0),
         gyro=GYRO_BIAS, accel=ACCEL_BIAS, odometer=0.0, mount=0.0, lever=0.0, gyro_scale=0.0,
-        accel_scale=0.0, slip=0.0, cut=0.0,
+        accel_scale=0.0, slip=0.0, squat=0.0, cut=0.0,
     )  # fmt: skip
     return known.covariance()
 

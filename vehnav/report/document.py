@@ -24,6 +24,7 @@ from vehnav.export.atomic import atomic_path
 from vehnav.logs.log import Gnss, Log
 from vehnav.pipeline import Run
 from vehnav.report.causes import causes_tree
+from vehnav.report.filtered import filter_tree
 from vehnav.start import Alignment
 from vehnav.units import DEG, DEG_PER_HOUR, NS
 
@@ -49,6 +50,7 @@ def document(run: Run) -> dict[str, Any]:
         },
         "gps": _gps(run, start),
         "noise": _noise(run),
+        "filter": filter_tree(run),
         "errors": _errors(run),
         "errors_before_first_stop": _backward(run.errors_before),
     }

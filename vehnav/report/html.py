@@ -8,7 +8,7 @@ from typing import Any
 
 from vehnav.export.atomic import atomic_path
 from vehnav.pipeline import Run
-from vehnav.report import causes, quality, sections
+from vehnav.report import causes, filtered, quality, sections
 from vehnav.report.mapping import map_of
 from vehnav.report.markup import esc
 from vehnav.report.page import page, section
@@ -44,6 +44,10 @@ def render_html(run: Run, document: Mapping[str, Any], *, command: str | None = 
         f'<div class="right">{_panels(run)}</div></div>',
         _judged(run),
         section("causes", "What caused the error", causes.causes_block(run), causes.NOTE),
+        section("filter", "What the filter found", filtered.filter_table(run), FILTER_NOTE),
+        section(
+            "innovations", "How the measurements fared", filtered.innovations_table(run), NIS_NOTE
+        ),
         section("stops", "What each stop corrected", sections.stops_table(document), STOPS_NOTE),
         section(
             "sensor",
@@ -65,6 +69,15 @@ METHODS_NOTE = (
     "the platform level while the vehicle stands, <em>velocity reset</em> sets its velocity to "
     "zero: the two procedures as published. The default adds the gyro bias that every stop shows "
     "and distributes over each leg what its ends found."
+)
+FILTER_NOTE = (
+    "States of the filter besides the track. A sigma that is still that of its start (vehicle.py, "
+    "Prior) says that the drive did not show the quantity."
+)
+NIS_NOTE = (
+    "Innovations beyond 2 sigma are weighed down, beyond 30 rejected. The mean of the normalised "
+    "innovation squared is 1 where a measurement errs as assumed; below where its errors last and "
+    "it is given more room for that (non-holonomic constraint)."
 )
 STOPS_NOTE = (
     "<em>Speed before reset</em> is what the velocity had drifted to when the vehicle stood again. "

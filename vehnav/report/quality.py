@@ -102,7 +102,7 @@ def calibration_table(run: Run) -> str:
     percent = [f"{100.0 * x:.0f} %" for x in found.circle]
     rows = [["horizontal", *percent, ""]]
     for name, shares in found.inside.items():
-        if name == "up" and run.config.vertical == "clamp":
+        if name == "up" and run.config.vertical == "clamp" and run.aided is None:
             continue  # the height is held: the solution claims nothing of it
         rms = f"{found.rms[name]:.2f}"
         rows.append([esc(name), *(f"{100.0 * x:.0f} %" for x in shares), rms])

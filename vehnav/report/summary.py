@@ -11,6 +11,7 @@ from vehnav.pipeline import Run
 from vehnav.report.causes import causes_lines
 from vehnav.report.circle import radius_95
 from vehnav.report.document import errors_after_gaps, log_sources
+from vehnav.report.filtered import filter_lines
 from vehnav.units import DEG, DEG_PER_HOUR, NS
 
 METHOD_NAMES: Final = {
@@ -24,7 +25,8 @@ METHOD_NAMES: Final = {
 
 def summary(run: Run) -> str:
     """The screen of ``vehnav run``."""
-    blocks = [_input(run), _start(run), _stops(run), _methods(run), _answer(run), causes_lines(run)]
+    blocks = [_input(run), _start(run), _stops(run), filter_lines(run)]
+    blocks += [_methods(run), _answer(run), causes_lines(run)]
     return "\n".join(line for block in blocks for line in block)
 
 
