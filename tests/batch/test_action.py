@@ -4,19 +4,24 @@ from __future__ import annotations
 
 import os
 import re
+import shutil
 import subprocess
 import sys
+import sysconfig
 from pathlib import Path
 from typing import Any
 
 import click
 import pytest
 import yaml
+from check_jsonschema.cli.main_command import main as check_jsonschema
+from click.testing import CliRunner
 
 from vehnav.cli.main import cli
 
 ROOT = Path(__file__).resolve().parents[2]
 ACTION = ROOT / ".github" / "actions" / "score" / "action.yml"
+BIN = sysconfig.get_path("scripts")
 unix = pytest.mark.skipif(sys.platform == "win32", reason="runs bash on paths of Unix")
 EVIL = "$(touch pwned) `touch pwned` ; touch pwned \" ' \\"
 
@@ -41,15 +46,33 @@ def snippet(word: str, path: Path) -> dict[str, Any]:
 
 def accepted(schema: str, path: Path) -> None:
     """By the schema that the vendor publishes; it comes with check-jsonschema."""
-    found = subprocess.run(
-        [sys.executable, "-m", "check_jsonschema", "--builtin-schema", schema, str(path)],
-        capture_output=True, text=True, check=False, timeout=120,
-    )  # fmt: skip
-    assert found.returncode == 0, found.stdout + found.stderr
+    found = CliRunner().invoke(check_jsonschema, ["--builtin-schema", schema, str(path)])
+    assert found.exit_code == 0, found.output
 
 
 def test_the_schema_of_github_accepts_it() -> None:
     accepted("vendor.github-actions", ACTION)
+
+
+def judged(*paths: Path) -> None:
+    """By zizmor: injected input, rights, loose references; it comes with the extra "dev"."""
+    program = shutil.which("zizmor", path=os.pathsep.join([BIN, os.environ.get("PATH", "")]))
+    if program is None:
+        pytest.skip("no zizmor")
+    found = subprocess.run(
+        [program, "--offline", "--no-progress", "--config", str(ROOT / ".github" / "zizmor.yml"),
+         *map(str, paths)],
+        capture_output=True, text=True, check=False, timeout=60,
+    )  # fmt: skip
+    assert found.returncode == 0, found.stdout + found.stderr
+
+
+def test_zizmor_finds_nothing(tmp_path: Path) -> None:
+    snippet("actions/score", tmp_path / "workflow.yml")
+    text = (tmp_path / "workflow.yml").read_text(encoding="utf-8")
+    own = tmp_path / "own.yml"  # as a user writes it whose action is pinned
+    own.write_text(text.replace("@main", f"@{'0123456789' * 4}"), encoding="utf-8")
+    judged(ACTION, ROOT / ".github" / "workflows" / "ci.yml", own)
 
 
 def test_every_input_is_described_and_used(action: dict[str, Any]) -> None:
@@ -112,7 +135,7 @@ def test_scores_with_what_is_given(action: dict[str, Any], tmp_path: Path) -> No
     text, names = script(action, "Score")
     given = score_inputs(
         SUITE="my drives/suite.toml", BASELINE="base line.json", OUTPUT="the reports",
-        ARGS="--max-regression 5%   --jobs 4",
+        ARGS="--max-regression 5%   --quiet\n--jobs 4\n",
     )  # fmt: skip
     assert set(given) == names
     status, folder = called(tmp_path, text, given)
@@ -120,7 +143,7 @@ def test_scores_with_what_is_given(action: dict[str, Any], tmp_path: Path) -> No
     assert (folder / "vehnav.called").read_text().splitlines() == [
         "score", "-o", "the reports", "--junit", "the reports/junit.xml",
         "--table", "the reports/results.csv", "--baseline", "base line.json",
-        "--max-regression", "5%", "--jobs", "4", "--", "my drives/suite.toml",
+        "--max-regression", "5%", "--quiet", "--jobs", "4", "--", "my drives/suite.toml",
     ]  # fmt: skip
     assert (folder / "output").read_text().splitlines() == [
         "status=0", "results=the reports/results.json",
@@ -169,6 +192,36 @@ def test_installs_what_is_asked_for(
     assert arguments == ["-m", "pip", "install", wanted.format(here=here)]
     assert not (folder / "pwned").exists()
     assert (Path(f"{here}/../../..") / "pyproject.toml").is_file()
+
+
+@unix
+@pytest.mark.slow
+def test_with_the_real_program(action: dict[str, Any], tmp_path: Path) -> None:
+    """What a job would see: status, summary, files."""
+    (tmp_path / "suite.toml").write_text(
+        '[suite]\nname = "town"\n[[log]]\nscenario = "city,duration=90,first_stop=20"\nrate = 50\n'
+        '[[bar]]\nmetric = "errors.horizontal_m.max"\nmax = 0.001\n'
+    )
+    file = tmp_path / "script.sh"
+    file.write_text(script(action, "Score")[0])
+    found = subprocess.run(
+        ["bash", "--noprofile", "--norc", "-eo", "pipefail", str(file)],
+        cwd=tmp_path, capture_output=True, text=True, check=False, timeout=120,
+        env={
+            **os.environ, "PATH": os.pathsep.join([BIN, os.environ["PATH"]]),
+            "GITHUB_ACTIONS": "true", "GITHUB_OUTPUT": str(tmp_path / "output"),
+            "GITHUB_STEP_SUMMARY": str(tmp_path / "summary.md"),
+            **score_inputs(SUITE="suite.toml", ARGS="--jobs 1\n--timeout 60\n"),
+        },
+    )  # fmt: skip
+    assert found.returncode == 1, found.stderr
+    assert "MISSED errors.horizontal_m.max" in found.stdout
+    assert (tmp_path / "output").read_text().splitlines() == [
+        "status=1", "results=out/results.json",
+    ]  # fmt: skip
+    assert (tmp_path / "summary.md").read_text().startswith("### town: failed")
+    for name in ("results.json", "index.html", "junit.xml", "results.csv"):
+        assert (tmp_path / "out" / name).is_file(), name
 
 
 def options_of_score() -> set[str]:
