@@ -82,7 +82,7 @@ def prior_of(grade, **more):
         "tilt": 0.05 * DEG, "heading": 0.5 * DEG, "velocity": 0.05, "position": (1.0, 1.0, 1.0),
         "gyro": grade.gyro_bias, "accel": grade.accel_bias, "odometer": 0.0, "mount": 0.0,
         "lever": 0.0, "gyro_scale": 0.0, "accel_scale": 0.0, "slip": 0.0,
-        "cut": 0.0,
+        "squat": 0.0, "cut": 0.0,
     }  # fmt: skip
     return Prior(**(known | more))
 

@@ -81,7 +81,7 @@ def test_each_aid_makes_it_better(town, solutions):
     worst = {name: float(np.max(error_of(found, town))) for name, found in solutions.items()}
     assert worst["filter"] < 0.6 * worst["stops"]  # no side slip, forward only
     assert worst["smooth"] <= worst["filter"] * 1.05
-    assert worst["wheel"] < worst["smooth"]
+    assert worst["wheel"] < 0.7 * worst["filter"]
     assert worst["aided"] < 3.0  # fixes of some metres around a minute without
 
 
@@ -166,7 +166,7 @@ def test_speed_and_constraint_see_no_attitude():  # T28
     rate = (0.01, 0.02, 0.2)
     for write in (
         lambda: measurements.no_side_slip(h, v, c_wb, rate, par),
-        lambda: measurements.no_lift(h, v, c_wb, par),
+        lambda: measurements.no_lift(h, v, c_wb, 1.5, par),
         lambda: measurements.odometer(h, v, c_wb, 10.0, par),
         lambda: measurements.zero_velocity(h, 0, v),
     ):
@@ -203,17 +203,17 @@ def test_measurement_rows_by_differences():
     row[:9] = c_we_from_geodetic(0.8, 0.1).ravel()
     row[10:13] = (11.0, 3.0, 0.3)
     row[13:] = c_nb_from_angles(1.2, 0.03, -0.02).ravel()
-    par[6:12] = (0.01, 0.02, -0.01, 1.2, 0.0, 0.004)
+    par[6:14] = (0.01, 0.02, -0.01, 1.2, 0.0, 0.004, 0.0, -0.007)
     rate = (0.02, 0.01, 0.3)
     kinds = (
         lambda h, v, c, p: measurements.no_side_slip(h, v, c, rate, p),
-        lambda h, v, c, p: measurements.no_lift(h, v, c, p),
+        lambda h, v, c, p: measurements.no_lift(h, v, c, 1.5, p),
         lambda h, v, c, p: measurements.odometer(h, v, c, 11.0, p),
     )
     for kind in kinds:
         h, scratch = np.zeros(SIZE), np.zeros(SIZE)
         z = kind(h, tuple(row[10:13]), mat3(row[13:].reshape(3, 3)), par)
-        for j in [*range(3, 9), *range(15, 19), 20, 21, 22]:
+        for j in [*range(3, 9), *range(15, 19), 20, 21, 22, 23]:
             step = 1e-5
             x = np.zeros(SIZE)
             x[j] = step

@@ -56,6 +56,7 @@ QUANTITIES: Final = (
     Quantity(vehicle.MOUNT_PITCH, "travel_up", "travel above forward", "deg", DEG, "nhc"),
     Quantity(vehicle.LEVER, "lever", "sensor before the rear axle", "m", 1.0, "nhc"),
     Quantity(vehicle.SLIP, "slip", "tyre slip, of speed squared and turning", "s2/m", 1.0, "nhc"),
+    Quantity(vehicle.SQUAT, "squat", "nose up per forward force", "deg/(m/s2)", -DEG, "nhc"),
     Quantity(vehicle.ODO_SCALE, "odometer_scale", "odometer reads too much", "%", PERCENT,
              "odometer"),
 )  # fmt: skip
