@@ -69,3 +69,18 @@ def test_noise_is_no_motion_and_even_circling_is(noise):
     white = noise * rng.standard_normal((120, 2))
     assert not _moves(white)
     assert _moves(3.0 * np.column_stack([np.cos(angle), np.sin(angle)]) + white)
+
+
+def test_a_height_that_wanders_makes_no_climb():
+    """Heights of a receiver without sigmas that rise by 12 m in the minute that aids.
+
+    That is some 5 m over a minute at the start, and 3 sigma where a normal error would be: the
+    height at the end is within 4 of its sigmas (15 with the height believed to 2 m).
+    """
+    made = simulate(TOWN, sensor="mems-industrial", seed=3, rate_hz=50.0, gnss=GnssModel())
+    log = made.log()
+    t = (log.gnss.t_ns - log.gnss.t_ns[0]) * 1e-9
+    gnss = replace(log.gnss, sigma_pos=None, height=log.gnss.height + 0.2 * np.maximum(t - 30, 0))
+    found = run(replace(log, gnss=gnss), Config(method="filter"))
+    truth = np.interp(found.trajectory.t_ns, made.truth.t_ns, made.truth.height)
+    assert abs(found.trajectory.height[-1] - truth[-1]) < 4.0 * found.trajectory.sigma_pos[-1, 2]

@@ -84,9 +84,9 @@ def measured_sigma(
 
 
 def with_sigma(aids: Aids, sigma: float) -> Aids:
-    """The fixes with another sigma than the default, m; heights keep their ratio."""
+    """The fixes with another horizontal sigma than the default, m."""
     fixes = aids.fixes.copy()
-    fixes[:, 6:9] *= (sigma / DEFAULT_SIGMA) ** 2
+    fixes[:, 6:8] *= (sigma / DEFAULT_SIGMA) ** 2
     return replace(aids, fixes=fixes)
 
 

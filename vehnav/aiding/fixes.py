@@ -14,8 +14,11 @@ from vehnav.earth import Ellipsoid, c_en, ecef_from_geodetic, local_enu
 Array = npt.NDArray[np.float64]
 
 DEFAULT_SIGMA: Final = 1.0
-"""m per horizontal axis at 1 Hz of a receiver that logs none; twice that for the height. What is
-slower in its error than a minute or two is common to start and judge and does not count."""
+"""m per horizontal axis at 1 Hz of a receiver that logs none. What is slower in its error than a
+minute or two is common to start and judge and does not count."""
+HEIGHT_SIGMA: Final = 10.0
+"""m at 1 Hz of the height of such a receiver: some 5 m that last for a minute. Believed more, a
+height that wanders by 10 m in a minute becomes a climb of the vehicle in its own axes, for good."""
 LEAST_SIGMA: Final = 0.01
 """m: stamps and swaying leave this even with a phase solution."""
 DEFAULT_VELOCITY_SIGMA: Final = 0.2
@@ -72,7 +75,7 @@ class Fixes:
             span = float(self.t[-1] - self.t[0]) if self.t.size > 1 else 0.0
             crowd = max(1.0, (self.t.size - 1) / span) if span > 0.0 else 1.0
             # fixes closer than a second share their errors
-            default = np.array([1.0, 1.0, 2.0]) * DEFAULT_SIGMA * np.sqrt(crowd)
+            default = np.array([DEFAULT_SIGMA, DEFAULT_SIGMA, HEIGHT_SIGMA]) * np.sqrt(crowd)
             return np.asarray(np.broadcast_to(default, (self.t.size, 3)))
         return np.maximum(self.sigma_pos, LEAST_SIGMA)
 
