@@ -273,8 +273,17 @@ def test_the_document_is_plain_and_the_same_twice() -> None:
         ("errors.velocity_m_s.rms", 0.001),
         ("errors.heading_deg.end", 0.01),
         ("errors.percent_of_distance.max", 0.01),
-        ("stops.count", 0.001),
+        ("stops.count", 0.5),
     ],
 )
 def test_floors_by_unit(metric: str, floor: float) -> None:
     assert floor_of(metric) == floor
+
+
+@pytest.mark.parametrize("metric", ["stops.count", "findings.gap", "gps.fixes_judged"])
+def test_a_count_that_begins_is_no_thousandfold(metric: str) -> None:
+    """From nothing to one: one more, against half of one, which is as good as none."""
+    floor = floor_of(metric)
+    assert worsening(0.0, 1.0, direction="less", floor=floor) == 2.0
+    assert worsening(5.0, 6.0, direction="less", floor=floor) == 0.2
+    assert worsening(5.0, 5.0, direction="less", floor=floor) == 0.0

@@ -10,10 +10,14 @@ from vehnav.batch.model import Result
 Direction = Literal["less", "more", "none"]
 """What is better: less, more, or neither (a figure held from both sides)."""
 
-FLOORS: Final = (("_m_s", 1e-3), ("_deg", 1e-2), ("percent", 1e-2), ("_m", 1e-2))
-"""By the end of a part of the name: the change in m/s, degrees, percent, m that is none."""
+FLOORS: Final = (
+    ("_m_s", 1e-3), ("_deg", 1e-2), ("percent", 1e-2), ("_m", 1e-2),
+    ("count", 0.5), ("findings", 0.5), ("fixes", 0.5),
+)  # fmt: skip
+"""By the end or the beginning of a part of the name: the change in m/s, degrees, percent, m, and
+of what is counted, that is none."""
 PLAIN_FLOOR: Final = 1e-3
-"""Of figures without a unit: shares, scores, counts."""
+"""Of figures without a unit: shares, scores."""
 
 
 def floor_of(metric: str) -> float:
@@ -22,7 +26,7 @@ def floor_of(metric: str) -> float:
     >>> floor_of("errors.horizontal_m.max"), floor_of("errors.velocity_m_s.rms")
     (0.01, 0.001)
     >>> floor_of("errors.percent_of_distance.end"), floor_of("stops.count")
-    (0.01, 0.001)
+    (0.01, 0.5)
     """
     parts = metric.split(".")
     for unit, floor in FLOORS:
