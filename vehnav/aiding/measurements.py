@@ -92,13 +92,15 @@ def no_lift(h: Array, v: Vec3, c_wb: Mat3, ahead: float, par: Array) -> float:
 
 @kernel
 def odometer(h: Array, v: Vec3, c_wb: Mat3, speed: float, par: Array) -> float:
-    """Z = v_forward - speed / (1 + kappa) (003 eq. 36, 37; kappa of spec B 6)."""
+    """Z = (1 + kappa) v_forward - speed (003 eq. 36, 37; kappa of spec B 6).
+
+    The row has the computed speed: the noise of the reading, in both, would pull the scale along.
+    """
     h[:] = 0.0
-    body_velocity(h, 1, c_wb, 1.0)
-    scale = 1.0 + float(par[6])
-    true_speed = speed / scale
-    h[15] = true_speed / scale
-    return mat_t_vec(c_wb, v)[1] - true_speed
+    scale, forward = 1.0 + float(par[6]), mat_t_vec(c_wb, v)[1]
+    body_velocity(h, 1, c_wb, scale)
+    h[15] = forward
+    return scale * forward - speed
 
 
 @kernel
