@@ -115,6 +115,7 @@ def test_nothing_is_lost_where_a_worker_is_killed(tmp_path, monkeypatch) -> None
 @pytest.fixture
 def fleet_of_processes(tmp_path) -> Iterator[tuple[str, subprocess.Popen[bytes]]]:
     """The address of a scheduler with a worker, and its process."""
+    code_digest.cache_clear()  # the worker reads the sources now; somebody may have edited them
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         address = f"tcp://127.0.0.1:{free.getsockname()[1]}"
@@ -180,7 +181,7 @@ def test_a_connection_that_breaks_while_a_result_is_fetched() -> None:
 
 
 def test_no_scheduler_and_no_worker(tmp_path, monkeypatch) -> None:
-    monkeypatch.setattr(fleet, "CONNECT_SECONDS", 1.0)
+    monkeypatch.setattr(fleet, "CONNECT_SECONDS", 0.5)
     suite = suite_of(tmp_path, 1)
     with pytest.raises(ConfigError, match=r"tcp://127.0.0.1:9: no Dask scheduler answers"):
         run_suite(suite, tmp_path / "out", scheduler="tcp://127.0.0.1:9")

@@ -77,7 +77,9 @@ def fleet_answers(
                 sent[future.key] = task
                 running.add(future)
 
-        for _ in range(max(1, IN_FLIGHT * _threads(client))):
+        with _gone():
+            threads = sum(client.nthreads().values())
+        for _ in range(max(1, IN_FLIGHT * threads)):
             send()
         for future in running:
             answer = _answer(future)
@@ -138,7 +140,8 @@ def _watched(client: Any) -> Iterator[None]:
             try:
                 client.sync(client.scheduler.identity, callback_timeout=ANSWER_SECONDS)
             except Exception:
-                client.loop.add_callback(hang_up)
+                if not done.is_set():
+                    client.loop.add_callback(hang_up)
                 return
 
     threading.Thread(target=watch, daemon=True).start()
@@ -146,10 +149,6 @@ def _watched(client: Any) -> Iterator[None]:
         yield
     finally:
         done.set()
-
-
-def _threads(client: Any) -> int:
-    return sum(client.nthreads().values())
 
 
 @contextmanager
