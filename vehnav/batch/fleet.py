@@ -95,7 +95,7 @@ def _distributed() -> Any:
     try:
         import distributed
     except ImportError:
-        raise ConfigError("--scheduler needs dask.distributed: pip install vehnav[fleet]") from None
+        raise ConfigError("--scheduler needs dask.distributed: pip install 'vehnav[fleet]'") from None
     return distributed
 
 

@@ -117,7 +117,7 @@ def store_of(url: str) -> tuple[Any, str]:
     try:
         import fsspec
     except ImportError:
-        raise ConfigError(f"{url}: a URL needs fsspec: pip install vehnav[fleet]") from None
+        raise ConfigError(f"{url}: a URL needs fsspec: pip install 'vehnav[fleet]'") from None
     try:
         store, path = fsspec.core.url_to_fs(url)
     except (ImportError, ValueError) as error:
