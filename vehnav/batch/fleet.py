@@ -95,7 +95,8 @@ def _distributed() -> Any:
     try:
         import distributed
     except ImportError:
-        raise ConfigError("--scheduler needs dask.distributed: pip install 'vehnav[fleet]'") from None
+        text = "--scheduler needs dask.distributed: pip install 'vehnav[fleet]'"
+        raise ConfigError(text) from None
     return distributed
 
 
