@@ -7,10 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from vehnav.aiding.fixes import Fixes
 from vehnav.config import Config
-from vehnav.earth import position_difference
+from vehnav.earth import WGS84, position_difference
 from vehnav.pipeline import run
-from vehnav.simulate import GnssModel, WheelModel, simulate
+from vehnav.simulate import GnssModel, Scenario, WheelModel, make_scenario, simulate
+from vehnav.simulate.motion import Body, RoadMotion
+from vehnav.simulate.program import ProgramBuilder
 
 CITY = "city,duration=300,seed=4,first_stop=30,stop_every=95"
 CLEAN = GnssModel(drift=0.0, noise=0.5)
@@ -18,7 +21,7 @@ CLEAN = GnssModel(drift=0.0, noise=0.5)
 
 def drive(scenario=CITY, **more):
     return simulate(
-        scenario, **({"sensor": "mems-industrial", "seed": 3, "rate_hz": 50.0, "gnss": CLEAN} | more)
+        scenario, sensor="mems-industrial", seed=3, rate_hz=50.0, **({"gnss": CLEAN} | more)
     )  # fmt: skip
 
 
@@ -52,3 +55,40 @@ def test_a_dead_wheel_sensor_is_not_believed():
             for x in (dead, replace(log, speed=None))
         )
         assert with_it < max(2.0 * without, most)
+
+
+def test_a_receiver_that_starts_late_does_not_place_the_start():
+    """Out of a garage: the first fix, 30 s and 300 m on, is not where the drive began."""
+    made = drive(gnss=replace(CLEAN, outages=((0.0, 60.0),)))
+    error, ratio = errors(made, run(made.log(), Config(method="smooth", gps="aid")))
+    assert error.max() < 5.0
+    assert ratio.max() < 3.5
+
+
+def backward_out_of_the_yard():
+    """10 s backward at 3 m/s, then like everybody."""
+    way = ProgramBuilder(heading=0.5).hold(30.0).change_speed(-3.0, peak=1.0)
+    way.turn(1.5, yaw_rate=0.3).hold(5.0).change_speed(0.0, peak=1.0).hold(5.0)
+    for angle in (1.5, -1.4, 1.5, -1.4):
+        way.change_speed(13.0, peak=2.0).hold(10.0).turn(angle, yaw_rate=0.4).hold(15.0)
+        way.change_speed(0.0, peak=2.0).hold(8.0)
+    tones = make_scenario(CITY).motion.tones
+    return Scenario("yard", RoadMotion(way.build(), (0.97, 0.65, 150.0), Body(), tones, WGS84))
+
+
+@pytest.mark.parametrize("gps", ["start", "aid"])
+def test_who_leaves_backward_does_not_point_there(gps):
+    """The course of the first fixes is that of the back: 3.4 km, and no fix could mend it."""
+    made = drive(backward_out_of_the_yard())
+    error, ratio = errors(made, run(made.log(), Config(method="filter", gps=gps)))
+    assert error.max() < 30.0
+    assert ratio.max() < 3.5
+
+
+def test_no_velocity_across_a_hole():
+    """Two fixes 60 s apart say nothing of the speed at either."""
+    t = np.concatenate([np.arange(5.0), 65.0 + np.arange(5.0)])
+    place = np.where(t < 60.0, 2.0 * t, 2000.0 + 2.0 * t)  # m to the north
+    radius = WGS84.a * (1.0 - WGS84.e2)  # of the meridian at the equator
+    fixes = Fixes(t, place / radius, np.zeros(10), np.zeros(10))
+    assert fixes.velocity(WGS84) == pytest.approx(np.tile([0.0, 2.0], (10, 1)), abs=1e-3)

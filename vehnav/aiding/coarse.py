@@ -29,6 +29,15 @@ COURSE_SPEED: Final = 2.0
 """m/s above which the course of a fix counts."""
 COURSE_SPAN: Final = 20.0
 """s of such fixes that give the heading: a gyro of 0.1 deg/s is off by 2 deg then."""
+FORWARD_SPEED: Final = 6.0
+"""m/s at which nothing reverses: a course so fast is the heading, a slower one perhaps its back."""
+FORWARD_WAIT: Final = 60.0
+"""s after the first course in which a fast one is worth more."""
+REVERSE_SPAN: Final = 10.0
+"""s after a departure in which the accelerometer tells forward from backward: a slope of 0.5 deg
+is 1 m/s then."""
+REACH: Final = 30.0
+"""m/s that a vehicle gets away while nothing shows where it is."""
 LEAST_HEADING: Final = 2.0 * DEG
 """rad: sigma of the best fit of the course."""
 UNKNOWN_HEADING: Final = 60.0 * DEG
@@ -128,9 +137,11 @@ def coarse_start(
         found, sigma = attitude[0], LEAST_HEADING
     if heading is not None:
         found, sigma = heading, 0.5 * LEAST_HEADING
-    v_n, place = np.zeros(3), (0.0, 0.0, 0.0)
+    v_n, place, place_sigma = np.zeros(3), (0.0, 0.0, 0.0), 0.0
     if fixes is not None:
         v_n, place = _motion(drive, fixes, standing, first, found)
+        moved = max(float(fixes.t[0]) - drive.stops[0].end, 0.0) if standing else 0.0
+        place_sigma = 2.0 + REACH * moved
     level = up_b if standing or fixes is None else _rolling_level(drive, fixes, bias, scale, first)
     pitch, roll = _angles(level)
     if attitude is not None and not standing:
@@ -142,7 +153,7 @@ def coarse_start(
         heading_sigma=sigma,
         tilt_sigma=(1.5 if standing else 3.0) * DEG,
         velocity_sigma=0.1 if standing else rolling_speed,
-        position_sigma=0.0 if fixes is None or position is not None else 2.0,
+        position_sigma=0.0 if position is not None else place_sigma,
         fitted=courses is not None and not told,
         compassed=north is not None,
     )  # fmt: skip
@@ -207,12 +218,29 @@ def _courses(
     index = np.flatnonzero((fixes.t > departure) & (speed > COURSE_SPEED))
     if index.size < 3:
         return None
+    soon = fixes.t[index] < fixes.t[index[0]] + FORWARD_WAIT
+    fast = index[soon & (speed[index] > FORWARD_SPEED)]
+    index = fast if fast.size >= 3 else index
     index = index[fixes.t[index] < fixes.t[index[0]] + COURSE_SPAN]
     course = np.arctan2(v[index, 0], v[index, 1])
+    if standing and fast.size < 3:
+        course += np.pi * _backward(drive, fixes.t[index], speed[index])
     offset = course - np.interp(fixes.t[index], drive.t, turned - turned[first])
     mean = float(np.angle(np.sum(speed[index] * np.exp(1j * offset))))
     spread = float(np.std(np.angle(np.exp(1j * (offset - mean)))))
     return mean, max(LEAST_HEADING, spread)
+
+
+def _backward(drive: Drive, t: Array, speed: Array) -> npt.NDArray[np.bool_]:
+    """Whether the vehicle goes backward with ``speed`` at instants ``t``, by its forward force.
+
+    That is told soon after the last stop before; later it goes as it did last.
+    """
+    stop = [stop for stop in drive.stops if stop.end < t[0]][-1]
+    ahead = drive.f[:, 1] - drive.f[stop.first : stop.last + 1, 1].mean()
+    gained = np.concatenate([[0.0], np.cumsum(0.5 * (ahead[1:] + ahead[:-1]) * np.diff(drive.t))])
+    at = np.minimum(t, stop.end + REVERSE_SPAN)
+    return np.asarray(np.interp(at, drive.t, gained) - gained[stop.last] < -0.5 * speed)
 
 
 def _motion(

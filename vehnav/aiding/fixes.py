@@ -80,13 +80,18 @@ class Fixes:
         return np.maximum(self.sigma_pos, LEAST_SIGMA)
 
     def velocity(self, earth: Ellipsoid) -> Array:
-        """(k, 2) m/s east and north: as logged, else central differences of the positions."""
+        """(k, 2) m/s east and north: as logged, else central differences of the positions.
+
+        Never across a hole; a fix without another one near it has none (zero).
+        """
         if self.v_n is not None:
             return self.v_n[:, :2]
         origin = (float(self.lat[0]), float(self.lon[0]), float(self.height[0]))
         place = local_enu(self.lat, self.lon, self.height, origin=origin, earth=earth)[:, :2]
-        a = np.searchsorted(self.t, self.t - 0.5 * SPEED_SPAN)
-        b = np.minimum(np.searchsorted(self.t, self.t + 0.5 * SPEED_SPAN), self.t.size - 1)
+        step = float(np.median(np.diff(self.t))) if self.t.size > 1 else 0.0
+        half = max(0.5 * (SPEED_SPAN + step), 1.5 * step)
+        a = np.searchsorted(self.t, self.t - half)
+        b = np.searchsorted(self.t, self.t + half, side="right") - 1
         span = np.maximum(self.t[b] - self.t[a], 1e-3)
         return np.asarray((place[b] - place[a]) / span[:, None])
 
