@@ -7,12 +7,12 @@ import os
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from contextlib import contextmanager
-from typing import Final, TypeVar
+from typing import TypeVar
+
+from vehnav.blas import ONE_THREAD
 
 T = TypeVar("T")
 R = TypeVar("R")
-
-_BLAS_THREADS: Final = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
 
 
 def cores() -> int:
@@ -44,8 +44,8 @@ def by_processes(work: Callable[[T], R], items: Iterable[T]) -> list[R]:
 @contextmanager
 def _single_threaded_children() -> Iterator[None]:
     """Processes started inside do their linear algebra on one core each: they share the cores."""
-    before = {name: os.environ.get(name) for name in _BLAS_THREADS}
-    os.environ.update(dict.fromkeys(_BLAS_THREADS, "1"))
+    before = {name: os.environ.get(name) for name in ONE_THREAD}
+    os.environ.update(ONE_THREAD)
     try:
         yield
     finally:

@@ -22,17 +22,11 @@ from typing import IO, Any, Final
 
 from vehnav.batch.task import Task
 from vehnav.batch.worker import write_trouble
+from vehnav.blas import ONE_THREAD
 from vehnav.errors import VehnavError
 
 START_SECONDS: Final = 300.0
 """For the imports and the compilation of the kernels."""
-_ONE_THREAD: Final = (
-    "OPENBLAS_NUM_THREADS",
-    "OMP_NUM_THREADS",
-    "MKL_NUM_THREADS",
-    "NUMBA_NUM_THREADS",
-    "VECLIB_MAXIMUM_THREADS",
-)
 
 
 class WorkerError(VehnavError):
@@ -125,7 +119,8 @@ class Fence:
             encoding="utf-8",
             env={
                 **os.environ,
-                **dict.fromkeys(_ONE_THREAD, "1"),
+                **ONE_THREAD,
+                "NUMBA_NUM_THREADS": "1",
                 "PYTHONPATH": os.pathsep.join(paths),
             },
         )

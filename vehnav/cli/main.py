@@ -17,6 +17,7 @@ from typing import Any
 import click
 
 from vehnav._version import __version__
+from vehnav.blas import stay_on_one_thread
 from vehnav.cli.status import BROKEN_PIPE, BUG, INTERRUPTED, OK, UNUSABLE
 from vehnav.errors import VehnavError
 
@@ -207,6 +208,7 @@ def cli(ctx: click.Context) -> None:
 
 def main() -> None:
     """Entry point of the console command."""
+    stay_on_one_thread()
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="replace")
