@@ -14,9 +14,12 @@ import numpy as np
 import numpy.typing as npt
 
 from vehnav.aiding.coarse import AT_ONCE, CoarseStart, coarse_start
+from vehnav.aiding.error_model import NAVIGATION
 from vehnav.aiding.fixes import Fixes
 from vehnav.aiding.known import with_sensor
 from vehnav.aiding.land import LandResult, Tuning, Use, run_land, tuning_from_log, with_steady_gyro
+from vehnav.aiding.lost import SECONDS
+from vehnav.aiding.vehicle import ODO_SCALE
 from vehnav.classic import Drive, Outcome
 from vehnav.config import Config, outage_spans
 from vehnav.earth import normal_gravity
@@ -34,6 +37,24 @@ VETO_SPEED: Final = 1.0
 """m/s of GPS over a stop that make it none (spec C 1)."""
 VETO_SIGMAS: Final = 3.0
 """Of the scatter of what GPS shows in a stop, by which it must stand out of its own noise."""
+CONTRADICTED: Final = {
+    "zupt": 0.02, "zaru": 0.1, "nhc": 0.02, "odometer": 0.15, "gnss": 0.1, "gnss velocity": 0.15,
+}  # fmt: skip
+"""Share of updates beyond two sigma or refused, over which the solution is in doubt: at most half
+of it on real logs whose solution is good, twice and more where a sensor or an assumption fails."""
+CAUSES: Final = {
+    "zupt": "a stop is none, or the solution has gone astray before",
+    "zaru": "a stop is none, or the gyro bias changes",
+    "nhc": "heading or axes are wrong, or the vehicle slides",
+    "odometer": "look at unit and delay of the wheel speed, or leave it out with --aid",
+    "gnss": "the fixes are late, jump, or are worse than their sigmas say",
+    "gnss velocity": "the fixes are late, or worse than their sigmas say",
+}
+"""What it may be."""
+ENOUGH: Final = 50
+"""Updates below which a share says nothing."""
+WRONG_SCALE: Final = 0.15
+"""Error of the wheel speed's scale over which it is no matter of tyres."""
 FEW_FIXES: Final = 3
 """Fixes below which GPS gives no start."""
 
@@ -288,4 +309,33 @@ def _findings(
     if given.heading is None and given.attitude is None and not (start.fitted or start.compassed):
         text = "no course of GPS shows the heading at the start: the frame is only local"
         findings.append(Finding("local-frame", "warning", text))
-    return findings
+    return findings + _doubts(result)
+
+
+def _doubts(result: LandResult) -> list[Finding]:
+    """What contradicts the solution: then its sigmas are too small."""
+    doubts = []
+    for name, row in result.innovations.items():
+        all_of_it = row.used + row.rejected
+        share = (row.inflated + row.rejected) / max(all_of_it, 1)
+        if all_of_it >= ENOUGH and share > CONTRADICTED[name]:
+            text = (
+                f"{name}: {100.0 * share:.0f} % of the updates contradict the solution (up to "
+                f"{100.0 * CONTRADICTED[name]:g} % where all is well): its sigmas are too small; "
+                f"{CAUSES[name]}"
+            )
+            doubts.append(Finding("contradiction", "warning", text))
+        if row.set_on:
+            text = (
+                f"{row.set_on} times all fixes of {SECONDS:g} s were refused and the solution was "
+                "set on them: before that it is far off, and its sigmas do not say so"
+            )
+            doubts.append(Finding("set-on-fixes", "warning", text))
+    scale = float(result.parameters[ODO_SCALE - NAVIGATION])
+    if "odometer" in result.innovations and abs(scale) > WRONG_SCALE:
+        text = (
+            f"the wheel speed reads {100.0 * scale:+.0f} % too much: look at its unit, or leave it "
+            "out with --aid"
+        )
+        doubts.append(Finding("odometer-scale", "warning", text))
+    return doubts

@@ -221,6 +221,7 @@ def _run_filter(drive: Drive, log: Log, config: Config, samples: Samples) -> Run
     errors = judge_aided(trajectory, log, aided.gps)
     agreement = agreement_with_gps(trajectory, log, aided.gps)
     findings = [*log.findings, *samples.findings, *aided.findings]
+    findings += stop_findings(aided.stops, aided.outcome.records, samples.t_ns)
     findings += polar_findings(trajectory, config)
     findings += [] if errors is None else list(errors.findings)
     return Run(

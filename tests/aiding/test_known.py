@@ -37,9 +37,9 @@ def test_the_run_says_whose_noise_it_took(tmp_path) -> None:
     told = {}
     for sensor in (None, "hg1700"):
         found = run(log, Config(axes="RFU", method="filter", sensor=sensor))
-        told[sensor] = [f.text for f in found.findings if f.code == "filter-tuning"]
-    assert "sensor" not in told[None][0].replace("deg/s/sqrt", "")
-    assert "white noise and bias walk of sensor hg1700" in told["hg1700"][0]
+        told[sensor] = found.aided.tuning.reason
+    assert "sensor" not in told[None]
+    assert "white noise and bias walk of sensor hg1700" in told["hg1700"]
     codes = [f.code for f in run(log, Config(axes="RFU", sensor="hg1700")).findings]
     assert codes.count("sensor-noise") == 1
     assert "sensor-noise" not in [f.code for f in run(log, Config(axes="RFU")).findings]

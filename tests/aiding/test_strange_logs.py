@@ -92,3 +92,44 @@ def test_no_velocity_across_a_hole():
     radius = WGS84.a * (1.0 - WGS84.e2)  # of the meridian at the equator
     fixes = Fixes(t, place / radius, np.zeros(10), np.zeros(10))
     assert fixes.velocity(WGS84) == pytest.approx(np.tile([0.0, 2.0], (10, 1)), abs=1e-3)
+
+
+def codes(found):
+    return {finding.code for finding in found.findings if finding.level != "info"}
+
+
+def test_a_filter_that_is_lost_is_set_on_the_fixes():
+    """Half a second of a gyro at its range turns the heading by 125 deg; no fix was taken after."""
+    made = drive()
+    log = made.log()
+    gyro, t = log.imu.gyro.copy(), (log.imu.t_ns - log.start_ns) * 1e-9
+    gyro[(t > 120.0) & (t < 120.5), 2] = 4.36
+    found = run(replace(log, imu=replace(log.imu, gyro=gyro)), Config(method="filter", gps="aid"))
+    error, ratio = errors(made, found)
+    assert error[-1] < 1.0
+    assert np.median(ratio) < 2.0
+    assert {"set-on-fixes", "contradiction"} <= codes(found)
+
+
+def test_a_short_jump_of_the_fixes_moves_nothing():
+    """200 m for 15 s: a reflection, refused to its end."""
+    made = drive()
+    log = made.log()
+    t, lat = (log.gnss.t_ns - log.start_ns) * 1e-9, log.gnss.lat.copy()
+    lat[(t >= 100.0) & (t < 115.0)] += 200.0 / WGS84.a
+    found = run(replace(log, gnss=replace(log.gnss, lat=lat)), Config(method="filter", gps="aid"))
+    assert errors(made, found)[0].max() < 3.0
+    assert "set-on-fixes" not in codes(found)
+
+
+@pytest.mark.parametrize("factor", [3.6, 0.0, -1.0])
+def test_a_wrong_wheel_speed_is_told(factor):
+    made = drive(wheel=WheelModel())
+    log = made.log()
+    wrong = replace(log, speed=replace(log.speed, speed=factor * log.speed.speed))
+    assert {"odometer-scale", "contradiction"} & codes(run(wrong, Config(method="filter")))
+
+
+def test_nothing_is_doubted_where_all_is_well():
+    found = run(drive(wheel=WheelModel()).log(), Config(method="filter", gps="aid"))
+    assert not codes(found)

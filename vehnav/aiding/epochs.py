@@ -114,8 +114,8 @@ def measure(
 ) -> None:
     """Apply a scalar measurement, write it down for the smoother, count it.
 
-    ``kept``: rows h, gains, (innovation, variance), and the number written; ``counts`` (kinds, 4):
-    used, inflated, rejected, sum of the normalised innovations squared.
+    ``kept``: rows h, gains, (innovation, variance), and the number written; ``counts`` (kinds, 5):
+    used, inflated, rejected, sum of the normalised innovations squared, and how often set on.
     """
     rows, gains, numbers, written = kept
     k = written[0]

@@ -15,9 +15,11 @@ import numpy as np
 import numpy.typing as npt
 
 from vehnav.aiding.blocks import ROW, attitude_of, run_block, take_off, take_off_parameters
-from vehnav.aiding.epochs import KINDS, at_rest, from_gnss, open_gap, predict, under_way
+from vehnav.aiding.epochs import GNSS, KINDS, at_rest, from_gnss, open_gap, predict, under_way
 from vehnav.aiding.gaps import GapSigmas
 from vehnav.aiding.kalman import symmetrise
+from vehnav.aiding.lost import SIZE as LOST
+from vehnav.aiding.lost import refused, set_on_fix
 from vehnav.aiding.vehicle import SIZE, Noise
 from vehnav.earth import Ellipsoid
 from vehnav.kernel import entry_kernel, kernel
@@ -106,12 +108,15 @@ class Innovations:
     used, inflated, rejected : int
     mean_nis : float
         Mean normalised innovation squared: 1 where the filter is honest.
+    set_on : int
+        How often the solution was set on fixes (:mod:`vehnav.aiding.lost`).
     """
 
     used: int
     inflated: int
     rejected: int
     mean_nis: float
+    set_on: int = 0
 
 
 @dataclass(frozen=True)
@@ -213,6 +218,7 @@ def run_epochs(
     p = covariance[0].copy()
     par, now = parameters[0].copy(), parameters[0].copy()
     x, h, work = np.zeros(SIZE), np.zeros(SIZE), np.zeros((SIZE, SIZE))
+    lost = np.zeros(LOST)
     for e in range(epochs.shape[0]):
         b = epochs[e]
         rate, force = (0.0, 0.0, 0.0), (0.0, 0.0)
@@ -243,11 +249,15 @@ def run_epochs(
             )  # fmt: skip
         if fix[e] >= 0:
             k = fix[e]
+            if set_on_fix(lost, t[b], fixes[k], ago[k], p, rows[b], fed_back[e], earth):
+                counts[GNSS, 4] += 1.0
+            rejected = counts[GNSS, 2]
             from_gnss(x, p, h, rows[b], fixes[k], ago[k], noise, kept, counts, earth)
+            refused(lost, t[b], fixes[k], counts[GNSS, 2] > rejected)
         symmetrise(p)
         take_off(rows[b], x, earth)
         take_off_parameters(par, x)
-        fed_back[e] = x[:9]
+        fed_back[e] += x[:9]
         x[:] = 0.0
         parameters[e] = par
         covariance[e] = p
@@ -289,7 +299,7 @@ def run_filter(
     )
     phi = np.zeros((m, 9, SIZE))
     kept = (np.zeros((most, SIZE)), np.zeros((most, SIZE)), np.zeros((most, 2)), np.zeros(1, int))
-    until, counts = np.zeros(m, np.int64), np.zeros((len(KINDS), 4))
+    until, counts = np.zeros(m, np.int64), np.zeros((len(KINDS), 5))
     run_epochs(
         (_ready(increments.t), _ready(increments.dtheta), _ready(increments.dvel),
          np.require(increments.coast, np.bool_, ["C", "W"])),
@@ -307,8 +317,8 @@ def run_filter(
 
 def _innovations(counts: Array) -> dict[str, Innovations]:
     return {
-        name: Innovations(int(a), int(b), int(c), float(d / max(a + c, 1.0)))
-        for name, (a, b, c, d) in zip(KINDS, counts, strict=True)
+        name: Innovations(int(a), int(b), int(c), float(d / max(a + c, 1.0)), int(e))
+        for name, (a, b, c, d, e) in zip(KINDS, counts, strict=True)
         if a + c > 0
     }
 
