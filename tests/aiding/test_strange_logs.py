@@ -133,3 +133,16 @@ def test_a_wrong_wheel_speed_is_told(factor):
 def test_nothing_is_doubted_where_all_is_well():
     found = run(drive(wheel=WheelModel()).log(), Config(method="filter", gps="aid"))
     assert not codes(found)
+
+
+@pytest.mark.parametrize("start", [70.0, 120.0, 185.0])
+def test_rates_at_the_edges_do_not_fill_a_long_gap(start):
+    """5 s without IMU: turning rates at its ends, taken for all of it, overturned the car."""
+    made = drive()
+    imu, log = made.imu, made.log()
+    t = (imu.t_ns - imu.t_ns[0]) * 1e-9
+    kept = (t < start) | (t > start + 5.0)
+    cut = replace(log.imu, t_ns=imu.t_ns[kept], gyro=log.imu.gyro[kept], accel=log.imu.accel[kept])
+    error, ratio = errors(made, run(replace(log, imu=cut), Config(method="filter")))
+    assert error.max() < 150.0
+    assert np.percentile(ratio, 95) < 5.0

@@ -28,6 +28,11 @@ TURN_SHARE: Final = (0.05, 0.05)
 these on the real drives, 0.13 at 1.6 s and 0.2 at 3 s."""
 TURN_FLOOR: Final = 0.003
 """rad/s2, times the squared length: a swerve that begins and ends inside a gap."""
+LONG: Final = 3.0
+"""s: what the rates at the edges tell of a gap; in a longer one the vehicle may have turned into
+any street, and stands level as before."""
+LEVEL: Final = 0.05
+"""rad: how much the slope of the road changes in a long gap."""
 FORCE_FLOOR: Final = 0.2
 """m/s3, times the squared length: velocity error of a gap (0.5 m/s at 1.6 s)."""
 
@@ -65,15 +70,20 @@ def bridge_gaps(increments: Increments, omega: Array, f: Array) -> tuple[Increme
     length = (t[gaps + 1] - t[gaps])[:, None]
     before, slope_before = _edge(t, omega, t[gaps], -EDGE)
     after, slope_after = _edge(t, omega, t[gaps + 1], EDGE)
-    share = TURN_SHARE[0] + TURN_SHARE[1] * length
-    sigmas.attitude[gaps] = np.hypot(
-        share * np.abs(after - before) * length, TURN_FLOOR * length**2
-    )
+    told = np.minimum(length, LONG)
+    share = TURN_SHARE[0] + TURN_SHARE[1] * told
+    left = np.hypot(share * np.abs(after - before) * told, TURN_FLOOR * told**2)
+    beyond = (length > LONG)[:, 0]
+    left[beyond, :2] = LEVEL
+    left[beyond, 2] *= (length[beyond, 0] / LONG) ** 3
+    sigmas.attitude[gaps] = left
     sigmas.velocity[gaps] = FORCE_FLOOR * length[:, 0] ** 2
     long = increments.coast[gaps]
-    bend = SLOPE_SHARE / 12.0 * length**2 * (slope_before - slope_after)
+    bend = SLOPE_SHARE / 12.0 * told**2 * (slope_before - slope_after)
+    turned = 0.5 * told * (before + after) + bend
+    turned[beyond, :2] = 0.0
     dtheta, dvel = increments.dtheta.copy(), increments.dvel.copy()
-    dtheta[gaps[long]] = (0.5 * length * (before + after) + bend)[long]
+    dtheta[gaps[long]] = turned[long]
     edges = 0.5 * (f[gaps] + f[gaps + 1])
     dvel[gaps[long]] = (edges * length)[long]
     nothing = np.zeros_like(increments.coast)
