@@ -53,6 +53,19 @@ def test_an_interrupted_suite_does_not_become_the_baseline(tmp_path) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.parametrize(
+    ("rows", "said"),
+    [
+        ([broken("a"), broken("b", "timeout")], r"none of the 2 runs has a result.*gates nothing"),
+        ([], "the suite has no logs here"),
+    ],
+)
+def test_a_baseline_without_figures_is_not_written(tmp_path, rows, said: str) -> None:
+    with pytest.raises(ConfigError, match=said):
+        write_baseline(suite(rows), tmp_path / "baseline.json")
+    assert list(tmp_path.iterdir()) == []
+
+
 ROW = {"log": "a", "group": "", "config": "c", "status": "ok", "metrics": {}}
 
 

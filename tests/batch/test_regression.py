@@ -232,6 +232,35 @@ def test_a_baseline_of_other_logs_does_not_pass_for_a_gate() -> None:
     assert against(before, suite([ok("a", 10.0), ok("b", 10.0)])).passed
 
 
+def test_a_baseline_without_figures_does_not_pass_for_a_gate() -> None:
+    """Also one whose figures are others than those that are gated now."""
+    now = suite([ok("a", 10.0), ok("b", 10.0)])
+    for before in (suite([broken("a"), broken("b", "timeout")]), suite([ok("a", None)])):
+        found = against(before, now)
+        assert not found.passed
+        assert regressions(found) == [
+            "the baseline has none of the gated figures; --update-baseline makes it again"
+        ]
+        assert gate_text(found).startswith("no gated figure could be compared with")
+        assert against(before, now, None).passed
+    assert against(suite([broken("a"), ok("b", 10.0)]), now).passed
+
+
+def test_where_there_is_no_figure_to_gate_it_is_said() -> None:
+    """Logs without GPS: only that they still run is held, and that is no "no regression"."""
+    rows = [ok("a", None), ok("b", None)]
+    found = against(suite(rows), suite(rows))
+    assert found.passed
+    assert gate_text(found).startswith("no gated figure could be compared with")
+    assert not against(suite(rows), suite([ok("a", None), broken("b")])).passed
+
+
+def test_runs_that_all_fail_now_are_not_blamed_on_the_baseline() -> None:
+    found = against(suite([ok("a", 10.0)]), suite([broken("a")]))
+    assert not found.passed
+    assert regressions(found) == ["a/default: crashed; in the baseline it ran"]
+
+
 def test_another_stretch_judged_is_named() -> None:
     before = suite([ok("a", 10.0), ok("b", 10.0)])
     fewer = {"gps.fixes_judged": 150.0}

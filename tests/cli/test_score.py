@@ -114,6 +114,21 @@ def test_baseline_and_every_file(suite, tmp_path, monkeypatch) -> None:
     assert vehnav(path, "-o", out, "--resume", "--max-regression", "150%").exit_code == 0
 
 
+def test_a_baseline_counts_the_runs_that_failed_and_needs_one_that_did_not(suite, tmp_path) -> None:
+    base = tmp_path / "baseline.json"
+    (tmp_path / "other.mcap").write_bytes(b"nothing")
+    path = written(tmp_path, "[[log]]\npath = 'other.mcap'\n[baseline]\nfile = 'baseline.json'\n")
+    some = vehnav(path, "-o", tmp_path / "out", "--update-baseline")
+    assert some.exit_code == 1  # a log failed
+    assert "baseline.json; 1 of 2 runs have no figures in it, as they failed" in some.stderr
+    base.unlink()
+    (tmp_path / "drive.mcap").write_bytes(b"nothing")
+    none = vehnav(path, "-o", tmp_path / "out", "--update-baseline")
+    assert none.exit_code == 2
+    assert "baseline.json: not written, none of the 2 runs has a result" in none.stderr
+    assert not base.exists()
+
+
 def test_options_that_do_not_fit_are_said_before_anything_runs(suite, tmp_path) -> None:
     for arguments, text in (
         (["--table", "x.xls"], "a table is written as"),

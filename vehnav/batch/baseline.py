@@ -89,7 +89,8 @@ def write_baseline(results: Results, path: str | Path) -> None:
     Raises
     ------
     ConfigError
-        The suite was not run to its end: what was not run would be lost from the baseline.
+        The suite was not run to its end: what was not run would be lost from the baseline. Or
+        nothing ran: there are no figures to compare with.
     """
     open_ends = [r.name for r in results.results if r.status == "interrupted"]
     if open_ends:
@@ -97,6 +98,10 @@ def write_baseline(results: Results, path: str | Path) -> None:
             f"{path}: not written, the suite was interrupted: {len(open_ends)} of "
             f"{len(results.results)} are not done ({open_ends[0]}); finish it with --resume"
         )
+    if not any(r.status == "ok" for r in results.results):
+        count = len(results.results)
+        why = f"none of the {count} runs has a result" if count else "the suite has no logs here"
+        raise ConfigError(f"{path}: not written, {why}: a baseline without figures gates nothing")
     item = baseline_of(results)
     rows = [
         {

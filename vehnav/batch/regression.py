@@ -17,8 +17,9 @@ under the floor counts as the floor: figures that are as good as zero may change
 The runs themselves are deterministic, so every change is real; the interval says whether another
 choice of logs would show it.
 
-Logs that only one side has are named and do not fail; a baseline that has none of the logs does,
-since it would gate nothing. Every row is judged by itself: of forty that only scatter, one is
+Logs that only one side has are named and do not fail; a baseline that has none of the logs, or none
+of their gated figures, does, since it would gate nothing. Where there is no figure to gate (no GPS,
+bars on both sides), that is said. Every row is judged by itself: of forty that only scatter, one is
 expected to fail.
 """
 
@@ -159,14 +160,21 @@ class Comparison:
 
     @property
     def idle(self) -> bool:
-        """Whether there is a gate, but nothing in common that it could look at."""
-        return self.max_regression is not None and self.compared == 0
+        """Whether there is a gate, but no figure on both sides that it could look at."""
+        judged = any(row.gated and row.worsening is not None for row in self.changes)
+        return self.max_regression is not None and not judged
+
+    @property
+    def empty(self) -> bool:
+        """Whether it is idle for what the baseline lacks: the logs, or their gated figures."""
+        lacks = any(row.gated and row.before is None for row in self.changes)
+        return self.idle and (lacks or self.compared == 0)
 
     @property
     def passed(self) -> bool:
         """Whether nothing regressed."""
         rows: list[Change | Paired | Turned] = [*self.changes, *self.paired, *self.turned]
-        return not self.idle and not any(row.failed for row in rows)
+        return not self.empty and not any(row.failed for row in rows)
 
     def to_dict(self) -> dict[str, Any]:
         """As plain data; of the changes those that moved."""

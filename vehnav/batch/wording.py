@@ -153,8 +153,10 @@ def interval_text(row: Paired) -> str:
 def regressions(item: Comparison) -> list[str]:
     """Everything that fails the gate, the suite first."""
     nothing = f"none of the logs is in the baseline, which is of the suite {item.suite!r}"
+    if item.compared:
+        nothing = "the baseline has none of the gated figures; --update-baseline makes it again"
     return [
-        *[nothing] * item.idle,
+        *[nothing] * item.empty,
         *(paired_text(p) for p in item.paired if p.failed),
         *(turned_text(t) for t in item.turned if t.failed),
         *(change_text(c) for c in item.changes if c.failed),
@@ -200,9 +202,10 @@ def _count(number: int, what: str) -> str:
 
 def gate_text(item: Comparison) -> str:
     """What the comparison with the baseline came to."""
-    failed = len(regressions(item))
     if item.idle:
-        return f"nothing was compared with {item.path}"
+        what = "no gated figure could be" if item.compared else "nothing was"
+        return f"{what} compared with {item.path}"
+    failed = len(regressions(item))
     if item.max_regression is None:
         return f"compared with {item.path}, nothing is gated"
     limits = f"{100.0 * item.max_regression:g} % in the median"

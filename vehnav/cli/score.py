@@ -327,7 +327,9 @@ def _leave(
     path = _baseline_path(suite, options)
     if options["update_baseline"] and path is not None:
         write_baseline(results, path)
-        click.echo(f"baseline: {path}", err=True)
+        failed = sum(result.status != "ok" for result in results.results)
+        lacks = f"; {failed} of {len(results.results)} runs have no figures in it, as they failed"
+        click.echo(f"baseline: {path}{lacks if failed else ''}", err=True)
     if not quiet:
         click.echo(f"results    {out / INDEX_NAME}, results.json beside it")
     good = results.passed and (comparison is None or comparison.passed)
