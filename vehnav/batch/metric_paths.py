@@ -9,6 +9,7 @@ from importlib import resources
 from typing import Any
 
 from vehnav.batch.fields import nearest
+from vehnav.batch.finding_codes import CODES
 from vehnav.errors import ConfigError
 
 
@@ -24,7 +25,8 @@ def check_metric(metric: str, where: str) -> None:
     """ConfigError, with the nearest name, for a path that no report can have.
 
     A step is refused only where the schema names all that there is (``additionalProperties``
-    false); ``findings.CODE`` and what is below a list are taken as they are.
+    false), and a ``findings.CODE`` whose code no finding has; what is below a list is taken as it
+    is.
 
     >>> check_metric("errors.horizontal_m.max", "bar")
     >>> check_metric("errors.horizontal_m.maxx", "bar")
@@ -32,9 +34,12 @@ def check_metric(metric: str, where: str) -> None:
     ...
     vehnav.errors.ConfigError: bar: no figure 'errors.horizontal_m.maxx'; did you mean 'max'?
     """
-    steps = metric.split(".")
-    if steps[0] == "findings":
+    first, _, code = metric.partition(".")
+    if first == "findings":
+        if code not in CODES:
+            raise ConfigError(f"{where}: no finding has the code {code!r}{nearest(code, CODES)}")
         return
+    steps = metric.split(".")
     node = _schema()
     for step in steps:
         named = node.get("properties", {})
