@@ -32,6 +32,7 @@ from vehnav.trajectory import Trajectory
 from vehnav.units import DEG, NS
 
 Array = npt.NDArray[np.float64]
+Arm = tuple[float, float, float]
 
 VETO_SPEED: Final = 1.0
 """m/s of GPS over a stop that make it none (spec C 1)."""
@@ -147,7 +148,9 @@ def run_aided(
     )
 
 
-def judge_aided(trajectory: Trajectory, log: Log, use: GpsUse) -> Errors | None:
+def judge_aided(
+    trajectory: Trajectory, log: Log, use: GpsUse, arm: Arm | None = None
+) -> Errors | None:
     """Errors against GPS by the fixes that aided nothing; None where too few are left."""
     if log.gnss is None:
         return None
@@ -160,17 +163,20 @@ def judge_aided(trajectory: Trajectory, log: Log, use: GpsUse) -> Errors | None:
             estimate_offset=not use.aids,
             outages=use.cut or (),
             start_ns=log.start_ns,
+            lever_arm=arm,
         )
     except VehnavError:
         return None
 
 
-def agreement_with_gps(trajectory: Trajectory, log: Log, use: GpsUse) -> Errors | None:
+def agreement_with_gps(
+    trajectory: Trajectory, log: Log, use: GpsUse, arm: Arm | None = None
+) -> Errors | None:
     """How far the track is from all fixes, those that aided among them: no error of the track."""
     if log.gnss is None or not use.aids:
         return None
     try:
-        return compare(trajectory, log.gnss)
+        return compare(trajectory, log.gnss, lever_arm=arm)
     except VehnavError:
         return None
 
@@ -202,6 +208,7 @@ def _usable(
     fixes = Fixes(
         np.asarray((gnss.t_ns - origin) * NS, np.float64), gnss.lat, gnss.lon, gnss.height,
         gnss.v_n, gnss.sigma_pos, gnss.sigma_vel, config.gnss_form,
+        config.lever_arm or (0.0, 0.0, 0.0),
     )  # fmt: skip
     return fixes.take(inside), until
 

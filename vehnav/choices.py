@@ -63,6 +63,7 @@ def given_start(config: Config) -> Given:
         if attitude is None
         else (attitude[0] * DEG, attitude[1] * DEG, attitude[2] * DEG),
         gps_seconds=config.gps_start_seconds,
+        lever_arm=config.lever_arm,
     )
 
 

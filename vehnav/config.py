@@ -72,6 +72,8 @@ class Config:
         What the solution may take from GPS.
     gnss_form : {"direct", "normal", "quasi"}
         How the filter compares fixes with its state (paper 003).
+    lever_arm : (right, forward, up) or None
+        m from the IMU to the antenna, axes of the vehicle.
     outage : tuple of str
         Stretches, s from the start of the log, whose fixes do not aid: ``A:B`` or
         ``every=180,length=60,from=60``.
@@ -113,6 +115,7 @@ class Config:
     stop_dwell: float | None = None
     gps: Literal["start", "none", "aid"] = "start"
     gnss_form: Literal["direct", "normal", "quasi"] = "direct"
+    lever_arm: tuple[float, float, float] | None = None
     outage: tuple[str, ...] = ()
     gps_start_seconds: float = 60.0
     start_position: tuple[float, float, float] | None = None

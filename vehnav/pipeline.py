@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Final
 
 import numpy as np
@@ -201,7 +202,11 @@ def run(log: Log, config: Config = DEFAULTS) -> Run:
     outcome = _solve(drive, start, corrections, noise, sigmas)
     trajectory = with_coordinates(_trajectory(outcome, samples, stops), config)
     variants = _variants(drive, start, noise, sigmas, samples, config, outcome)
-    judged = {} if log.gnss is None else _judge_all(trajectory, variants, log.gnss, gps)
+    judged = (
+        {}
+        if log.gnss is None
+        else _judge_all(trajectory, variants, log.gnss, gps, config.lever_arm)
+    )
     errors, before = judged.pop("", None), judged.pop("before", None)
     findings = [*log.findings, *samples.findings, *start_findings, *sensor_findings(config)]
     findings += stop_findings(stops, outcome.records, samples.t_ns)
@@ -218,8 +223,8 @@ def _run_filter(drive: Drive, log: Log, config: Config, samples: Samples) -> Run
     aided = run_aided(drive, samples.t_ns, log, config, given_start(config))
     aided = replace(aided, gps=with_axes(aided.gps, samples, log.gnss))
     trajectory = with_coordinates(_trajectory(aided.outcome, samples, aided.stops), config)
-    errors = judge_aided(trajectory, log, aided.gps)
-    agreement = agreement_with_gps(trajectory, log, aided.gps)
+    errors = judge_aided(trajectory, log, aided.gps, config.lever_arm)
+    agreement = agreement_with_gps(trajectory, log, aided.gps, config.lever_arm)
     findings = [*log.findings, *samples.findings, *aided.findings]
     findings += stop_findings(aided.stops, aided.outcome.records, samples.t_ns)
     findings += polar_findings(trajectory, config)
@@ -371,23 +376,25 @@ def _variants(
 
 
 def _judge_all(
-    trajectory: Trajectory, variants: Mapping[str, Trajectory], gnss: Gnss, gps: GpsUse
-) -> dict[str, Errors]:
+    trajectory: Trajectory, variants: Mapping[str, Trajectory], gnss: Gnss, gps: GpsUse,
+    arm: tuple[float, float, float] | None,
+) -> dict[str, Errors]:  # fmt: skip
     """Errors of the trajectory (""), before the first stop ("before"), and of the variants.
 
     A fix that the solution used judges nothing; what no fix can judge is left out.
     """
     judged: dict[str, Errors] = {}
+    judge = partial(compare, lever_arm=arm)
     since = None if gps.until_ns is None else gps.until_ns + 1
     try:
-        judged[""] = compare(trajectory, gnss, judge_from_ns=since, estimate_offset=True)
+        judged[""] = judge(trajectory, gnss, judge_from_ns=since, estimate_offset=True)
         for name, track in variants.items():
-            judged[name] = compare(track, gnss, judge_from_ns=since)
+            judged[name] = judge(track, gnss, judge_from_ns=since)
     except VehnavError:
         judged.clear()
     first_stop = int(trajectory.t_ns[np.argmax(trajectory.stopped)])
     asked = "units" in gps.used_for  # by fixes from the start of the log on
     if first_stop > trajectory.t_ns[0] and gps.until_ns is not None and not asked:
         with suppress(VehnavError):
-            judged["before"] = compare(trajectory, gnss, exclude=[(first_stop, 2**62)])
+            judged["before"] = judge(trajectory, gnss, exclude=[(first_stop, 2**62)])
     return judged

@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from vehnav.alignment import bias_along_gravity
 from vehnav.classic import Corrections, Drive, Outcome, Start, rest_of
-from vehnav.earth import normal_gravity
+from vehnav.earth import geodetic_from_local_enu, normal_gravity
 from vehnav.errors import Finding
 from vehnav.gps_start import (
     HeadingFit,
@@ -119,12 +119,15 @@ class Given:
         rad
     gps_seconds : float
         s of driving after the first departure that give the heading.
+    lever_arm : (right, forward, up) or None
+        m from the IMU to the antenna, axes of the vehicle.
     """
 
     position: tuple[float, float, float] | None = None
     heading: float | None = None
     attitude: tuple[float, float, float] | None = None
     gps_seconds: float = 60.0
+    lever_arm: tuple[float, float, float] | None = None
 
 
 def find_start(
@@ -160,11 +163,22 @@ def find_start(
             text = "GPS shows under 20 m of driving after the first stop: the heading is unknown"
             findings.append(Finding("heading-unknown", "warning", text))
     start = start.turned(drive, heading or 0.0)
+    if fix is not None and given.lever_arm is not None:
+        start = replace(start, position=_before_antenna(start, given.lever_arm, drive))
     alignment = _alignment(samples, drive, start, given, fix, fit, heading_from, rest_force)
     if alignment.local:
         findings.append(_local_finding(alignment))
     sigmas = (fix.sigma if fix else 0.0, fit.sigma if fit else 0.0)
     return start, alignment, _gps_use(fix, window if fit else None), sigmas, findings
+
+
+def _before_antenna(
+    start: Start, arm: tuple[float, float, float], drive: Drive
+) -> tuple[float, float, float]:
+    """The IMU's place, where ``start`` has that of the antenna."""
+    back = -(start.c_nb @ np.asarray(arm))
+    lat, lon, height = geodetic_from_local_enu(back, origin=start.position, earth=drive.earth)
+    return float(lat), float(lon), float(height)
 
 
 def _given_heading(given: Given) -> tuple[float | None, str]:

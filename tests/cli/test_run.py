@@ -130,15 +130,15 @@ def test_outputs_that_cannot_be_written_are_refused_before_the_work(
     assert not (tmp_path / "q").exists()
 
 
-def test_two_logs_get_a_folder_each(drive, tmp_path) -> None:
-    with CliRunner().isolated_filesystem(tmp_path):
-        for name in ("a", "b"):
-            shutil.copy(drive, f"{name}.csv")
-            shutil.copy(drive.with_name("drive.gps.csv"), f"{name}.gps.csv")
-        result = vehnav("run", "a.csv", "b.csv", "--quiet")
-        assert result.exit_code == 0
-        assert Path("a.vehnav/report.json").is_file()
-        assert Path("b.vehnav/report.json").is_file()
+def test_two_logs_get_a_folder_each(drive, tmp_path, monkeypatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    for name in ("a", "b"):
+        shutil.copy(drive, f"{name}.csv")
+        shutil.copy(drive.with_name("drive.gps.csv"), f"{name}.gps.csv")
+    result = vehnav("run", "a.csv", "b.csv", "--quiet")
+    assert result.exit_code == 0
+    assert Path("a.vehnav/report.json").is_file()
+    assert Path("b.vehnav/report.json").is_file()
 
 
 @pytest.mark.parametrize(

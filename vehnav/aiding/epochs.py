@@ -12,6 +12,7 @@ from vehnav.aiding.error_model import fill_error_matrix
 from vehnav.aiding.gnss_forms import position_row, see_fix, velocity_row
 from vehnav.aiding.kalman import propagate, transition_rows, update
 from vehnav.aiding.measurements import (
+    add_arm,
     gnss_position,
     gnss_velocity,
     no_lift,
@@ -196,6 +197,7 @@ def from_gnss(
     h: Array,
     row: Array,
     fix: Array,
+    arms: tuple[Vec3, Vec3],
     ago: float,
     noise: Noise,
     kept: tuple[Array, Array, Array, IntArray],
@@ -205,7 +207,8 @@ def from_gnss(
     """A fix: 13 numbers, Earth-fixed position and velocity (NaN: none), six variances, the form.
 
     Variances are along east, north, up; as the wander axes are turned against them, both
-    horizontal ones are taken as their mean.
+    horizontal ones are taken as their mean. ``arms``: what the lever arm added to both, wander
+    axes; it is taken off already, but turns with the attitude error.
     """
     place, v = place_of(row), velocity_of(row)
     z = gnss_position(place, row[9], v, (fix[0], fix[1], fix[2]), ago, earth)
@@ -216,15 +219,19 @@ def from_gnss(
     flat = 0.5 * (fix[6] + fix[7])
     for j in range(2):
         position_row(h, j, seen)
+        add_arm(h, seen[1][j], arms[0])
         measure(GNSS, x, p, h, seen[0][j], flat, noise, kept, counts)
     h[:] = 0.0
     h[2] = 1.0
+    add_arm(h, (0.0, 0.0, 1.0), arms[0])
     measure(GNSS, x, p, h, z[2], fix[8], noise, kept, counts)
     if not np.isnan(fix[3]):
         flat = 0.5 * (fix[9] + fix[10])
         for j in range(2):
             velocity_row(h, j, seen, place, row[9], v, earth)
+            add_arm(h, seen[1][j], arms[1])
             measure(GNSS_VELOCITY, x, p, h, seen[0][2 + j], flat, noise, kept, counts)
         up = mat_vec(place, (fix[3], fix[4], fix[5]))[2]
         gnss_velocity(h, 2, place, row[9], v, earth)
+        add_arm(h, (0.0, 0.0, 1.0), arms[1])
         measure(GNSS_VELOCITY, x, p, h, v[2] - up, fix[11], noise, kept, counts)

@@ -14,12 +14,20 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from vehnav.aiding.blocks import ROW, attitude_of, run_block, take_off, take_off_parameters
+from vehnav.aiding.blocks import (
+    ROW,
+    attitude_of,
+    place_of,
+    run_block,
+    take_off,
+    take_off_parameters,
+)
 from vehnav.aiding.epochs import GNSS, KINDS, at_rest, from_gnss, open_gap, predict, under_way
 from vehnav.aiding.gaps import GapSigmas
 from vehnav.aiding.kalman import symmetrise
 from vehnav.aiding.lost import SIZE as LOST
 from vehnav.aiding.lost import refused, set_on_fix
+from vehnav.aiding.measurements import arms_of, take_arms_off
 from vehnav.aiding.vehicle import SIZE, Noise
 from vehnav.earth import Ellipsoid
 from vehnav.kernel import entry_kernel, kernel
@@ -59,6 +67,8 @@ class Aids:
         :func:`vehnav.aiding.vibration.shaken_densities` at the epochs.
     skewed : (m, 3)
         :func:`vehnav.aiding.vibration.skewed_rates` at the epochs; zero where the vehicle stands.
+    arm : (right, forward, up)
+        m from the IMU to the antenna, body axes.
     """
 
     epochs: IntArray
@@ -72,6 +82,7 @@ class Aids:
     ago: Array
     shaken: Array
     skewed: Array
+    arm: Vec3 = (0.0, 0.0, 0.0)
 
     def part(self, m: int) -> Aids:
         """Those of the first ``m`` epochs."""
@@ -199,6 +210,7 @@ def run_epochs(
     fix: IntArray,
     fixes: Array,
     ago: Array,
+    arm: Vec3,
     shaken: Array,
     skewed: Array,
     noise: Noise,
@@ -218,6 +230,7 @@ def run_epochs(
     p = covariance[0].copy()
     par, now = parameters[0].copy(), parameters[0].copy()
     x, h, work = np.zeros(SIZE), np.zeros(SIZE), np.zeros((SIZE, SIZE))
+    seen = np.zeros(fixes.shape[1])
     lost = np.zeros(LOST)
     for e in range(epochs.shape[0]):
         b = epochs[e]
@@ -249,11 +262,13 @@ def run_epochs(
             )  # fmt: skip
         if fix[e] >= 0:
             k = fix[e]
-            if set_on_fix(lost, t[b], fixes[k], ago[k], p, rows[b], fed_back[e], earth):
+            arms = arms_of(attitude_of(rows[b]), rate, arm)
+            take_arms_off(fixes[k], place_of(rows[b]), arms, seen)
+            if set_on_fix(lost, t[b], seen, ago[k], p, rows[b], fed_back[e], earth):
                 counts[GNSS, 4] += 1.0
             rejected = counts[GNSS, 2]
-            from_gnss(x, p, h, rows[b], fixes[k], ago[k], noise, kept, counts, earth)
-            refused(lost, t[b], fixes[k], counts[GNSS, 2] > rejected)
+            from_gnss(x, p, h, rows[b], seen, arms, ago[k], noise, kept, counts, earth)
+            refused(lost, t[b], seen, counts[GNSS, 2] > rejected)
         symmetrise(p)
         take_off(rows[b], x, earth)
         take_off_parameters(par, x)
@@ -305,8 +320,8 @@ def run_filter(
          np.require(increments.coast, np.bool_, ["C", "W"])),
         _ready(gaps.attitude), _ready(gaps.velocity),
         aids.epochs, aids.stopped, (aids.zupt, aids.zaru, aids.nhc), aids.speed, aids.fix,
-        aids.fixes, aids.ago, aids.shaken, aids.skewed, noise, absolute, earth, rows, parameters,
-        covariance, fed_back, phi, kept, until, counts,
+        aids.fixes, aids.ago, aids.arm, aids.shaken, aids.skewed, noise, absolute, earth, rows,
+        parameters, covariance, fed_back, phi, kept, until, counts,
     )  # fmt: skip
     u = int(kept[3][0])
     return Filtered(

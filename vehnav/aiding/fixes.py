@@ -41,6 +41,8 @@ class Fixes:
         East, north, up.
     form : {"direct", "normal", "quasi"}
         How the filter compares them with its state (:mod:`vehnav.aiding.gnss_forms`).
+    arm : (right, forward, up)
+        m from the IMU to the antenna, body axes.
     """
 
     t: Array
@@ -51,6 +53,7 @@ class Fixes:
     sigma_pos: Array | None = None
     sigma_vel: Array | None = None
     form: Form = "direct"
+    arm: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     def take(self, index: npt.NDArray[np.bool_]) -> Fixes:
         """Some of the fixes."""

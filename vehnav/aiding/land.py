@@ -222,8 +222,9 @@ def put_to_epochs(
     shaken = shaken_densities(drive.t, drive.omega, drive.f, t[epochs])
     skewed = skewed_rates(drive.t, drive.omega, t[epochs]) * ~still[:, None]
     return Aids(
-        epochs, still, use.zupt, use.zaru, use.nhc, reading, fix, table, ago, shaken, skewed
-    )
+        epochs, still, use.zupt, use.zaru, use.nhc, reading, fix, table, ago, shaken, skewed,
+        (0.0, 0.0, 0.0) if inside is None else inside.arm,
+    )  # fmt: skip
 
 
 def _readings(t: Array, speed: tuple[Array, Array] | None) -> Array:

@@ -117,6 +117,38 @@ def gnss_position(
 
 
 @kernel
+def arms_of(c_wb: Mat3, rate: Vec3, arm: Vec3) -> tuple[Vec3, Vec3]:
+    """What the lever arm ``arm`` (body axes) adds to position and velocity, wander axes.
+
+    C_wb l and C_wb (omega x l); the rate of the axes themselves over the Earth is nothing to it.
+    """
+    turning = (
+        rate[1] * arm[2] - rate[2] * arm[1],
+        rate[2] * arm[0] - rate[0] * arm[2],
+        rate[0] * arm[1] - rate[1] * arm[0],
+    )
+    return mat_vec(c_wb, arm), mat_vec(c_wb, turning)
+
+
+@kernel
+def take_arms_off(fix: Array, place: Mat3, arms: tuple[Vec3, Vec3], out: Array) -> None:
+    """The fix (13,) as the IMU's place would have it, into ``out``."""
+    out[:] = fix
+    for k in range(2):
+        d = mat_t_vec(place, arms[k])
+        for j in range(3):
+            out[3 * k + j] -= d[j]
+
+
+@kernel
+def add_arm(h: Array, axis: Vec3, arm: Vec3) -> None:
+    """Add the attitude to a row along ``axis``: (C' - C) l = (C' l) x alpha."""
+    h[6] += axis[1] * arm[2] - axis[2] * arm[1]
+    h[7] += axis[2] * arm[0] - axis[0] * arm[2]
+    h[8] += axis[0] * arm[1] - axis[1] * arm[0]
+
+
+@kernel
 def gnss_velocity(h: Array, j: int, place: Mat3, height: float, v: Vec3, earth: Ellipsoid) -> None:
     """Row of z = V' - C_we V_e: the full velocity error delta V + V x beta."""
     h[:] = 0.0

@@ -58,8 +58,8 @@ RUN_FIELDS = (
     "levelling", "reset", "causal", "frame", "coords", "vertical", "ellipsoid", "levelling_rate",
     "stop_threshold",
     "stop_statistic", "stop_window", "stop_dwell", "gps", "gps_start_seconds", "start_position",
-    "start_heading", "start_attitude", "aid", "sensor", "sensor_grade", "azimuth", "outage",
-    "gnss_form",
+    "start_heading", "start_attitude", "lever_arm", "aid", "sensor", "sensor_grade", "azimuth",
+    "outage", "gnss_form",
 )  # fmt: skip
 
 
@@ -177,6 +177,10 @@ RUN_FIELDS = (
 @option(
     "gps", "--start-position", type=NumbersType("LAT,LON,HEIGHT"),
     help="Where the first stop is: deg, deg, m.",
+)  # fmt: skip
+@option(
+    "gps", "--lever-arm", type=NumbersType("RIGHT,FORWARD,UP"),
+    help="The antenna from the IMU, m in the vehicle's axes.",
 )  # fmt: skip
 @option(
     "gps", "--start-heading", type=NumberType(), metavar="DEG",
