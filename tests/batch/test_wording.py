@@ -29,7 +29,8 @@ from vehnav.batch.wording import (
         ((-0.02, 0.14), "95 %: 2.0 % better to 14.0 % worse"),
         ((0.0, 0.14), "95 %: the same to 14.0 % worse"),
         ((0.2, 0.2000001), "95 %: 20.0 % worse"),
-        ((5.0, 20.0), "95 %: 500 % worse to 21 times"),
+        ((10.0, 20.0), "95 %: 11 to 21 times the baseline"),
+        ((5.0, 20.0), "95 %: 500 % worse to 21 times the baseline"),
     ],
 )
 def test_intervals(interval, text: str) -> None:

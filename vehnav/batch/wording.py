@@ -71,12 +71,12 @@ def moved(worsening: float) -> str:
     """A relative change in words.
 
     >>> moved(0.0612), moved(-0.03), moved(0.0), moved(24.5)
-    ('6.1 % worse', '3.0 % better', 'the same', '26 times')
+    ('6.1 % worse', '3.0 % better', 'the same', '26 times the baseline')
     """
     if worsening == 0.0:
         return "the same"
     if worsening >= 9.995:
-        return f"{worsening + 1.0:.0f} times"
+        return f"{worsening + 1.0:.0f} times the baseline"
     share = 100.0 * abs(worsening)
     text = f"{share:.0f}" if share >= 99.95 else f"{share:.1f}" if share >= 0.05 else "under 0.1"
     return f"{text} % {'worse' if worsening > 0.0 else 'better'}"
@@ -144,9 +144,9 @@ def interval_text(row: Paired) -> str:
     low, high = (moved(end) for end in row.interval)
     if low == high:
         return f"95 %: {low}"
-    word = low.split()[-1]
-    if word in {"worse", "better"} and high.endswith(f" % {word}"):
-        low = low.removesuffix(f" % {word}")
+    for unit in (" % worse", " % better", " times the baseline"):
+        if high.endswith(unit):
+            low = low.removesuffix(unit)
     return f"95 %: {low} to {high}"
 
 
