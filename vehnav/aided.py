@@ -333,8 +333,9 @@ def _doubts(result: LandResult) -> list[Finding]:
             )
             doubts.append(Finding("contradiction", "warning", text))
         if row.set_on:
+            times = "once" if row.set_on == 1 else f"{row.set_on} times"
             text = (
-                f"{row.set_on} times all fixes of {SECONDS:g} s were refused and the solution was "
+                f"{times} all fixes of {SECONDS:g} s were refused and the solution was "
                 "set on them: before that it is far off, and its sigmas do not say so"
             )
             doubts.append(Finding("set-on-fixes", "warning", text))

@@ -280,8 +280,9 @@ def _local_finding(alignment: Alignment) -> Finding:
     return Finding(
         "local-frame",
         "warning",
-        f"the start {' and '.join(unknown)} are not known: the frame is only local (position "
-        "0, 0 and heading 0 stand for them); --gps-file, or --start-position and --start-heading",
+        f"the start {' and '.join(unknown)} {'is' if len(unknown) == 1 else 'are'} not known: the "
+        "frame is only local (position 0, 0 and heading 0 stand for them); --gps-file, or "
+        "--start-position and --start-heading",
     )
 
 

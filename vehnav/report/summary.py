@@ -5,7 +5,11 @@ from __future__ import annotations
 import math
 from typing import Final
 
+import numpy as np
+
 from vehnav.evaluation import Errors
+from vehnav.evaluation.matching import MIN_FIXES, in_intervals
+from vehnav.logs.log import Gnss
 from vehnav.orientation import Orientation
 from vehnav.pipeline import Run
 from vehnav.report.causes import causes_lines
@@ -84,15 +88,39 @@ def metres(value: float) -> str:
 def _no_judge(run: Run) -> str:
     if run.log.gnss is None:
         return "no GPS in the log: nothing to judge the track by"
-    if run.gps.aids:
-        return "no GPS fix is left to judge the track: all aid it; --outage cuts some out"
     if run.errors_before is None:
-        return "no GPS fix is left to judge the track: all were used for the start"
+        return _why_no_judge(run, run.log.gnss)
     before = run.errors_before.horizontal
     return (
         "no GPS fix is left after the start; the part before the first stop, integrated backward, "
         f"is {metres(float(before[0]))} off at the start of the log, {metres(float(before.max()))} "
         "at most"
+    )
+
+
+def _why_no_judge(run: Run, gnss: Gnss) -> str:
+    """Why the GPS that there is judges nothing."""
+    use, t_ns = run.gps, run.trajectory.t_ns
+    if use.aids and not use.cut:
+        return "no GPS fix is left to judge the track: all aid it; --outage cuts some out"
+    if run.alignment.position_from == "none":
+        because = "" if use.used_for else "GPS was not used, and "
+        return f"{because}the frame is only local: GPS cannot judge the track"
+    since = t_ns[0] if use.until_ns is None else max(t_ns[0], use.until_ns + 1)
+    inside = (gnss.t_ns >= since) & (gnss.t_ns <= t_ns[-1])
+    if use.cut:
+        inside &= in_intervals(gnss.t_ns, use.cut)
+    left = int(np.count_nonzero(inside))
+    if not left and use.until_ns is not None:
+        return "no GPS fix is left to judge the track: all were used for the start"
+    if left < MIN_FIXES:
+        where = "during the track" if use.until_ns is None else "after the start"
+        where = "in the outages" if use.cut else where
+        there = "1 GPS fix lies" if left == 1 else f"{left or 'no'} GPS fixes lie"
+        return f"{there} {where}: too few to judge the track, which takes {MIN_FIXES}"
+    return (
+        f"none of {left} GPS fixes can judge the track: it is not where they are, or they are "
+        "uncertain or lie in its gaps; vehnav compare says which"
     )
 
 
