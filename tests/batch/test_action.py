@@ -171,21 +171,19 @@ def test_inputs_are_never_run(action: dict[str, Any], tmp_path: Path) -> None:
 
 @unix
 @pytest.mark.parametrize(
-    ("version", "extras", "wanted"),
+    ("extras", "wanted"),
     [
-        ("1.2", "", "vehnav==1.2"),
-        ("1.2", "rosbag,protobuf", "vehnav[rosbag,protobuf]==1.2"),
-        ("", "", "{here}/../../.."),
-        ("", "rosbag", "{here}/../../..[rosbag]"),
-        (EVIL, "", "vehnav==" + EVIL),
+        ("", "{here}/../../.."),
+        ("rosbag,protobuf", "{here}/../../..[rosbag,protobuf]"),
+        (EVIL, "{here}/../../..[" + EVIL + "]"),
     ],
 )
-def test_installs_what_is_asked_for(
-    action: dict[str, Any], tmp_path: Path, version: str, extras: str, wanted: str
+def test_installs_what_it_comes_with(
+    action: dict[str, Any], tmp_path: Path, extras: str, wanted: str
 ) -> None:
     text, names = script(action, "Install vehnav")
     here = str(ACTION.parent)
-    given = {"VERSION": version, "EXTRAS": extras, "HERE": here}
+    given = {"EXTRAS": extras, "HERE": here}
     assert set(given) == names
     _, folder = called(tmp_path, text, given)
     arguments = (folder / "python.called").read_text().splitlines()
@@ -280,3 +278,14 @@ def test_the_job_for_gitlab_of_the_readme(tmp_path: Path) -> None:
     assert job["artifacts"]["when"] == "always"  # the reports are wanted when it fails
     named = set(re.findall(r"--[a-z-]+", "\n".join(job["script"])))
     assert named <= options_of_score()
+
+
+def test_nothing_is_installed_from_where_it_is_not(action: dict[str, Any], tmp_path: Path) -> None:
+    """vehnav is on no index: the one place that installs it by name names the repository."""
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    (owner,) = set(re.findall(r"uses: (\S+)/\.github/actions/score@", text))
+    (line,) = [row for row in snippet("artifacts:", tmp_path / "x.yml")["score"]["script"]
+               if row.startswith("pip install")]  # fmt: skip
+    assert line == f"pip install git+https://github.com/{owner}"
+    assert not re.search(r"pip install (-U )?vehnav\b", text)
+    assert "version" not in action["inputs"]
