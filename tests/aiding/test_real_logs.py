@@ -7,11 +7,14 @@ project set itself, tightened where it is better. GPS delays are those measured 
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from vehnav.config import Config
-from vehnav.logs.log import ReadOptions
+from vehnav.earth import local_enu
+from vehnav.logs.log import ReadOptions, Speed
 from vehnav.logs.read import read_log
 from vehnav.pipeline import run
 
@@ -56,6 +59,29 @@ def test_gps_for_a_minute_only(logs, name, method, worst, end):
     found = percent(run(log, Config(method=method, axes=axes)))
     assert found[0] <= worst
     assert found[1] <= end
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("method", ["filter", "smooth"])
+def test_wheel_speed(logs, method):
+    """Speed by GPS of 1 cm in the place of a wheel's, 1.5 % too much, 10 Hz: under 0.95 %."""
+    log, axes = logs["0708"]
+    g = log.gnss
+    east = earth_difference(g)
+    t = (g.t_ns - g.t_ns[0]) * 1e-9
+    v = np.gradient(east, t, axis=0)
+    rng = np.random.default_rng(1)
+    reading = 1.015 * np.hypot(*v.T) + 0.03 * rng.standard_normal(t.size)
+    log = replace(log, speed=Speed(g.t_ns, reading, "simulated from GPS"))
+    worst, end = percent(run(log, Config(method=method, axes=axes)))
+    assert worst <= 0.95
+    assert end <= 0.7
+
+
+def earth_difference(g):
+    """(n, 2) m east and north from the first fix."""
+    origin = (float(g.lat[0]), float(g.lon[0]), float(g.height[0]))
+    return local_enu(g.lat, g.lon, g.height, origin=origin)[:, :2]
 
 
 @pytest.mark.slow

@@ -50,6 +50,7 @@ def test_document_fits_its_schema_and_says_what_was_used(turned):
     jsonschema.validate(content, schema())
     assert content["filter"]["grade"] == "mems"
     assert content["filter"]["gps_sigma_m"] == turned.aided.fix_sigma
+    assert content["filter"]["noise"]["gyro"] == turned.aided.tuning.noise.gyro > 0.0
     used = content["filter"]["innovations"]
     assert set(used) == {"zupt", "zaru", "nhc", "odometer", "gnss"}
     later = content["gps"]["fixes_used"] - 1  # the first one is where the drive starts

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from vehnav.aiding import vehicle
+from vehnav.aiding.fix_noise import FLOOR
 from vehnav.aiding.land import LandResult
 from vehnav.pipeline import Run
 from vehnav.report.markup import esc, table
@@ -77,13 +78,14 @@ def estimates(found: LandResult) -> dict[str, tuple[Quantity, float, float]]:
 
 
 def filter_tree(run: Run) -> dict[str, Any] | None:
-    """``filter`` of the document: noise in force, innovations, what was found."""
+    """``filter`` of the document: noise in force (SI), innovations, what was found."""
     found = run.aided
     if found is None:
         return None
     return {
         "grade": found.tuning.name,
         "reason": found.tuning.reason,
+        "noise": found.tuning.noise._asdict(),
         "gps_sigma_m": found.fix_sigma,
         "innovations": {
             name.replace(" ", "_"): {
@@ -112,6 +114,8 @@ def filter_lines(run: Run) -> list[str]:
         for quantity, value, sigma in (rows[key] for key in OF_THE_SCREEN if key in rows)
     ]
     fixes = "" if found.fix_sigma is None else f"; fixes {found.fix_sigma:.1f} m by innovations"
+    if found.fix_sigma == FLOOR:
+        fixes = f"; fixes {FLOOR:g} m, the least that is assumed"
     lines = [f"filter     noise of {found.tuning.name} grade ({found.tuning.reason}){fixes}"]
     return lines + [f"           {'; '.join(shown)}"] * bool(shown)
 
