@@ -69,17 +69,30 @@ def test_a_baseline_without_figures_is_not_written(tmp_path, rows, said: str) ->
 ROW = {"log": "a", "group": "", "config": "c", "status": "ok", "metrics": {}}
 
 
+def of_rows(*rows: object) -> str:
+    return json.dumps({"version": 1, "suite": "s", "results": rows})
+
+
 @pytest.mark.parametrize(
     ("content", "said"),
     [
         ("{", "not a baseline"),
         ("[]", "version None"),
         ('{"version": 99}', "version 99, expected 1"),
-        ('{"version": 1, "suite": "s"}', "KeyError 'results'"),
+        ('{"version": 1, "suite": "s"}', "vehnav: no field 'results'; make it again with --upd"),
+        ('{"version": 1, "suite": "s", "results": 3}', "field 'results': expected rows, not 3"),
+        (of_rows(ROW, "b"), "row 2: expected an object, not 'b'"),
+        (of_rows(ROW, {"log": "b", "config": "c"}), r"row 2 \(b/c\): no field 'status'"),
+        (of_rows({"status": "ok", "metrics": {}}), r"row 1 \(\?/\?\): no field 'log'"),
+        (of_rows({**ROW, "metrics": []}), r"row 1 \(a/c\): field 'metrics': expected an object"),
+        (
+            of_rows({**ROW, "metrics": {MAX: "12,5"}}),
+            rf"row 1 \(a/c\): field 'metrics: {MAX}': expected a number, not '12,5'",
+        ),
         (json.dumps({"version": 1, "suite": "s", "results": [ROW, ROW]}), "a/c is there twice"),
         (
             json.dumps({"version": 1, "suite": "s", "results": [{**ROW, "status": "fine"}]}),
-            "status 'fine'",
+            r"row 1 \(a/c\): field 'status': expected one of ok, .*, not 'fine'",
         ),
         (
             json.dumps(

@@ -117,8 +117,8 @@ AGAIN = "make it again with --update-baseline"
         ),
         (
             '{"version": 1, "suite": "s"}',
-            "not a results.json of vehnav: KeyError 'results'$",
-            "not a baseline of vehnav: KeyError 'results'$",
+            "not a results.json of vehnav: no field 'results'$",
+            f"not a baseline of vehnav: no field 'results'; {AGAIN}$",
         ),
         (None, "cannot be read: No such file or directory$", "no such baseline; the first one is"),
     ],

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any, Final, get_args
 
 from vehnav.batch.model import METRICS, VERSION, Result, Results, Status, read_versioned
+from vehnav.batch.rows import figures_of, one_of, rows_of
 from vehnav.errors import ConfigError, FormatError
 from vehnav.export.atomic import atomic_path
 
@@ -139,17 +140,16 @@ def read_baseline(path: str | Path) -> Baseline:
 
 
 def _baseline(content: Mapping[str, Any]) -> Baseline:
-    kept = tuple(_kept(row) for row in content["results"])
-    return Baseline("", str(content["suite"]), kept)
+    return Baseline("", str(content["suite"]), tuple(rows_of(content, _kept)))
 
 
 def _kept(row: Mapping[str, Any]) -> Kept:
-    if row["status"] not in get_args(Status):
-        raise ValueError(f"status {row['status']!r}")
-    metrics = {str(n): None if v is None else float(v) for n, v in row["metrics"].items()}
-    if not all(v is None or math.isfinite(v) for v in metrics.values()):
-        raise ValueError(f"a figure of {row['log']} is not finite")
-    return Kept(str(row["log"]), str(row["group"]), str(row["config"]), row["status"], metrics)
+    status = one_of(row, "status", get_args(Status))
+    metrics = figures_of(row, "metrics")
+    for name, value in metrics.items():
+        if value is not None and not math.isfinite(value):
+            raise ValueError(f"field 'metrics: {name}': not finite ({value})")
+    return Kept(str(row["log"]), str(row["group"]), str(row["config"]), status, metrics)
 
 
 def _refuse_twins(path: str | Path, kept: Iterable[Kept]) -> None:

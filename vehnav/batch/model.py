@@ -15,6 +15,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final, Literal, TypeVar, get_args
 
+from vehnav.batch.rows import figures_of, number_of, one_of, rows_of
 from vehnav.errors import ConfigError, FormatError
 from vehnav.export.atomic import atomic_path
 
@@ -284,7 +285,7 @@ def read_versioned(
     if_missing : str
         What to say where there is no such file, if that is a mistake of the call.
     if_other : str
-        What to do about another version.
+        What to do about another version or a damaged file.
 
     Raises
     ------
@@ -308,40 +309,37 @@ def read_versioned(
     try:
         return build(content)
     except (KeyError, TypeError, ValueError, AttributeError) as error:
-        raise FormatError(
-            f"{path}: not a {what} of vehnav: {type(error).__name__} {error}"
-        ) from error
+        found = f"no field {error}" if isinstance(error, KeyError) else str(error)
+        text = f"{path}: not a {what} of vehnav: {found}"
+        raise FormatError(f"{text}; {if_other}" if if_other else text) from error
 
 
 def results_from_dict(content: Mapping[str, Any]) -> Results:
     """The records of plain data; KeyError, TypeError or ValueError where it does not fit."""
     return Results.of(
         str(content["suite"]),
-        [result_from_dict(row) for row in content["results"]],
+        rows_of(content, result_from_dict),
         RunBlock(**content["run"]),
     )
 
 
 def result_from_dict(row: Mapping[str, Any]) -> Result:
     """One record of plain data; errors as :func:`results_from_dict`."""
-    if row["status"] not in get_args(Status):
-        raise ValueError(f"status {row['status']!r}")
-    metrics = {str(name): _number(value) for name, value in row["metrics"].items()}
+    status = one_of(row, "status", get_args(Status))
+    metrics = figures_of(row, "metrics")
     bars = tuple(
         BarResult(
             str(bar["metric"]),
             "max" if bar["bound"] == "max" else "min",
             float(bar["limit"]),
-            _number(bar["value"]),
+            number_of(bar["value"], "value of a bar"),
             bool(bar["passed"]),
         )
         for bar in row["bars"]
     )
-    return Result(**{**row, "metrics": metrics, "bars": bars})
-
-
-def _number(value: Any) -> float | None:
-    return None if value is None else float(value)
+    names = (row["log"], row["group"], row["config"])
+    others = {key: row[key] for key in row if key not in ("log", "group", "config", "status")}
+    return Result(*names, status, **{**others, "metrics": metrics, "bars": bars})
 
 
 def metric_value(report: Mapping[str, Any], metric: str) -> float | None:
