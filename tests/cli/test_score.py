@@ -158,13 +158,21 @@ def test_files_may_lie_in_the_folder_of_the_results_which_is_new(suite, tmp_path
     assert (out / "junit.xml").is_file()
 
 
-def test_absent_logs_are_named(tmp_path) -> None:
-    path = tmp_path / "suite.toml"
-    path.write_text("[suite]\nname = 's'\n[[log]]\npath = 'real/*.mcap'\noptional = true\n")
-    result = vehnav(path, "-o", tmp_path / "out")
+def test_absent_logs_are_named_and_counted(suite, tmp_path) -> None:
+    absent = "[[log]]\npath = 'real/*.mcap'\noptional = true\n"
+    path = tmp_path / "none.toml"
+    path.write_text(f"[suite]\nname = 's'\n{absent}")
+    result = vehnav(path, "-o", tmp_path / "out", "--quiet")
     assert result.exit_code == 0
     assert "skipped: real/*.mcap: not there" in result.stderr
+    assert "warning: 1 optional [[log]] is absent: nothing is scored" in result.stderr
+    path.write_text(path.read_text() + absent.replace("real", "other"))
+    result = vehnav(path, "-o", tmp_path / "out")
+    assert "warning: 2 optional [[log]] are absent: nothing is scored" in result.stderr
     assert "no logs" in result.stdout
+    some = vehnav(written(tmp_path, absent), "-o", tmp_path / "out")
+    assert "warning: 1 optional [[log]] is absent; 1 log is scored" in some.stderr
+    assert "warning" not in vehnav(written(tmp_path, ""), "-o", tmp_path / "out").stderr
 
 
 def test_init_and_go(suite, tmp_path) -> None:

@@ -144,8 +144,7 @@ def score(suite: str | None, as_json: bool, quiet: bool, **options: Any) -> None
     loaded, out = _suite(suite, options)
     baseline = _baseline(loaded, options)
     _check_files(loaded, out, options)
-    for text in loaded.skipped:
-        click.echo(f"skipped: {text}", err=True)
+    _say_absent(loaded)
     results = _run(loaded, out, options, quiet=quiet or as_json)
     comparison = _compared(baseline, results, loaded, options)
     if as_json:
@@ -225,6 +224,19 @@ def _check_files(suite: Suite, out: Path, options: dict[str, Any]) -> None:
     for file in map(Path, filter(None, files)):
         if not file.parent.is_dir() and file.parent.resolve() != out.resolve():
             raise ConfigError(f"{file}: there is no folder {file.parent}; make it first")
+
+
+def _say_absent(suite: Suite) -> None:
+    """Which optional logs are not there, and how many: a suite of none passes."""
+    for text in suite.skipped:
+        click.echo(f"skipped: {text}", err=True)
+    count = len(suite.skipped)
+    if count:
+        absent = "1 optional [[log]] is" if count == 1 else f"{count} optional [[log]] are"
+        there = len(suite.logs)
+        scored = f"; {there} log{'s are' if there > 1 else ' is'} scored"
+        rest = scored if there else ": nothing is scored"
+        click.echo(f"warning: {absent} absent{rest}", err=True)
 
 
 def _run(suite: Suite, out: Path, options: dict[str, Any], *, quiet: bool) -> Results:
