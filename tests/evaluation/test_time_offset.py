@@ -6,9 +6,12 @@ import numpy as np
 import pytest
 from drives import gnss_of, trajectory_of
 
+from vehnav.config import Config
 from vehnav.evaluation import compare
 from vehnav.evaluation.time_offset import TimeOffset, estimate_time_offset
 from vehnav.logs.log import Gnss
+from vehnav.pipeline import run
+from vehnav.simulate import simulate
 from vehnav.trajectory import Trajectory
 
 DURATION = 600.0
@@ -96,6 +99,47 @@ def test_steady_motion_tells_nothing() -> None:
     errors = compare(trajectory, gnss, time_offset="auto")
     assert errors.time_offset == 0.0
     assert [f.code for f in errors.findings] == ["gps-delay"]
+
+
+def drifting(bend: float = 0.0) -> tuple[Trajectory, Gnss]:
+    """A straight drive at 30 m/s whose estimate bends away faster and faster, e-fold in 150 s.
+
+    ``bend``, rad, is the amplitude of what the vehicle steers itself, each 15 s; GPS is 0.5 s late.
+    """
+    t = np.arange(0.0, DURATION, 0.05)
+    heading = 1.0 + bend * np.sin(2.0 * np.pi * t / 15.0)
+    truth, _ = path(t, 30.0 + 0.0 * t, heading)
+    wrong = heading + 0.02 * np.exp(t / 150.0)
+    estimate, v = path(t, 30.0 + 0.0 * t, wrong)
+    at = np.arange(0.0, DURATION - 1.0)
+    fixes = np.column_stack([np.interp(at, t, truth[:, k]) for k in range(3)])
+    fixes += np.random.default_rng(7).normal(0.0, 0.1, fixes.shape)
+    return trajectory_of(t, estimate, v, wrong), gnss_of(at + 0.5, fixes)
+
+
+def test_drift_is_no_motion() -> None:
+    """The track bends, GPS shows none of it."""
+    trajectory, gnss = drifting()
+    assert estimate_time_offset(trajectory, gnss) is None
+
+
+def test_corrections_of_a_filter_are_no_motion() -> None:
+    """A filter without stops on a straight way over the pole: the drift of its track by kilometres
+    and its corrections at the epochs were taken for motion (0.7 to 1.2 s of delay, sigma 0.01 s).
+    """
+    made = simulate("polar", sensor="hg1700", rate_hz=50.0)
+    found = run(made.log(), Config(method="filter"))
+    assert found.errors is not None
+    assert found.errors.horizontal.max() > 1000.0
+    assert found.errors.found_offset is None
+    assert "gps-delay" not in {finding.code for finding in found.findings}
+
+
+def test_the_delay_is_found_beside_drift_where_gps_shows_the_motion() -> None:
+    found = estimate_time_offset(*drifting(bend=0.1))
+    assert found is not None
+    assert found.offset == pytest.approx(-0.5, abs=3.0 * found.sigma)
+    assert found.sigma < 0.1
 
 
 def test_too_short_tells_nothing() -> None:

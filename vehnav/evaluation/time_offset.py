@@ -3,7 +3,8 @@
 Half a second is 5 m at 10 m/s, more than a good receiver's noise, and dead reckoning drifts by
 more than that: so the drive is cut into windows, and in each one everything slow is fitted away
 (a parabola per axis, a turn and a stretch of the track). What remains and points along the
-velocity is time. The windows vote; their scatter is the uncertainty.
+velocity is time. The windows vote; their scatter is the uncertainty. Only windows vote in which GPS
+shows the changes of velocity that the track has: those of a track that drifts are not motion.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from vehnav.earth import position_difference
+from vehnav.earth import position_difference, turn_of_axes
 from vehnav.evaluation.matching import in_long_gaps
 from vehnav.logs.log import Gnss
 from vehnav.trajectory import Trajectory, interpolate_positions
@@ -32,6 +33,10 @@ FIX_INTERVAL: Final = 0.5
 """s: faster receivers are thinned; their fixes are correlated anyway."""
 MIN_FIXES: Final = 15
 """In a window, for nine unknowns."""
+SHOWN: Final = 0.5
+"""Of the track's changes of velocity, what GPS must show: the rest is drift."""
+SHOWN_SIGMAS: Final = 3.0
+"""By which these changes stand out of the noise of the fixes."""
 MIN_WINDOWS: Final = 4
 """To say how far they scatter."""
 ITERATIONS: Final = 8
@@ -140,10 +145,12 @@ def _equations(window: _Window, offset: float) -> tuple[Array, Array, Array]:
     here, before, after = (
         interpolate_positions(window.piece, t_ns + np.int64(shift)) for shift in (0, -half, half)
     )
+    k = t_ns.size // 2
     residual = position_difference(window.lat, window.lon, here[0], here[1], window.height)
     velocity = position_difference(after[0], after[1], before[0], before[1], window.height)
     velocity /= 2.0 * half * NS
-    k = t_ns.size // 2
+    turn = turn_of_axes(here[0], here[1], here[0][k], here[1][k])[:, :2, :2]  # near a pole
+    residual, velocity = (np.einsum("kij,kj->ki", turn, x) for x in (residual, velocity))
     track = position_difference(here[0], here[1], here[0][k], here[1][k], window.height)
     track -= track.mean(axis=0)
     s = (window.t_ns - window.t_ns[0]) * NS / WINDOW - 0.5
@@ -157,6 +164,31 @@ def _equations(window: _Window, offset: float) -> tuple[Array, Array, Array]:
         ]
     )
     return residual.T.ravel(), velocity.T.ravel(), slow
+
+
+def _shown_by_gps(window: _Window, offset: float) -> bool:
+    """Whether GPS shows the changes of velocity that the track has in a window.
+
+    Velocities of both between the fixes beside each one, without their mean and trend: the slope of
+    those by GPS on those of the track is one where the track is right, and the share of the motion
+    in the power where it drifts.
+    """
+    t_ns = window.t_ns + np.int64(round(offset / NS))
+    lat, lon, _ = interpolate_positions(window.piece, t_ns)
+    k = t_ns.size // 2
+    at = (lat[k], lon[k], window.height)
+    by_track = position_difference(lat, lon, *at)
+    by_gps = position_difference(window.lat, window.lon, *at)
+    s = (window.t_ns - window.t_ns[0]) * NS
+    between = (s[2:] - s[:-2])[:, None]
+    trend = np.stack([np.ones(s.size - 2), s[1:-1] / WINDOW], axis=1)
+    u, g = (
+        np.concatenate(_without(trend, *((p[2:] - p[:-2]) / between).T)) for p in (by_track, by_gps)
+    )
+    power = float(u @ u)
+    slope = float(u @ g) / max(power, 1e-12)
+    noise = float(np.sqrt(np.mean((g - slope * u) ** 2)))
+    return slope > SHOWN and slope * np.sqrt(power) > SHOWN_SIGMAS * noise
 
 
 def _without(slow: Array, *vectors: Array) -> list[Array]:
@@ -190,7 +222,7 @@ def _vote(windows: list[_Window], offset: float) -> TimeOffset | None:
         residual, velocity, slow = _equations(window, offset)
         r, v = _without(slow, residual, velocity)
         power = float(v @ v)
-        if power < 1.0:
+        if power < 1.0 or not _shown_by_gps(window, offset):
             continue  # steady motion: a shift in time is a shift in place
         step = float(v @ r) / power
         left = r - step * v
