@@ -174,8 +174,7 @@ whose gyro shakes most the error of the pitch over 10 s follows its fastest vibr
 of 0.2 to 0.5, about each axis, of whose square half is found by its skew. Constraint: residuals of
 two GPS-aided drives have 0.03 to 0.1 m/s, correlated over seconds; 0.09 and 0.06 m/s at 10 Hz, with
 the shares of turning and speed, carry the information of such noise. Judged by the share of errors
-inside 1, 2, 3 sigma after GPS ends, at many times of two drives (39, 86, 99 % wanted): 43 to 51,
-79 to 83, 96 to 98 % with the times chosen in three ways, smoothed 38 to 46, 76 to 82, 95 to 96 %.
+inside 1, 2, 3 sigma after GPS ends, at many times of two drives; the README has the figures.
 """
 TACTICAL: Final = MEMS._replace(
     gyro=0.006 * DEG,
@@ -187,5 +186,5 @@ TACTICAL: Final = MEMS._replace(
 )
 """Tactical grade (fibre-optic, ring laser, the best MEMS): gyro and accelerometer better.
 
-Judged as above on two drives with one such sensor: 53, 88, 98 %, smoothed 51, 90, 100 %.
+Judged as above, on two drives with one such sensor.
 """
