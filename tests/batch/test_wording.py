@@ -10,6 +10,7 @@ from vehnav.batch.model import BarResult, Result
 from vehnav.batch.regression import Paired, compare_with
 from vehnav.batch.wording import (
     bar_text,
+    change_text,
     headline,
     interval_text,
     moved,
@@ -48,6 +49,21 @@ def test_figures(value: float, text: str) -> None:
 
 def test_a_change_too_small_to_print_is_not_called_none() -> None:
     assert moved(1e-5) == "under 0.1 % worse"
+
+
+@pytest.mark.parametrize(
+    ("before", "now", "text"),
+    [
+        (0.0, 5.0, "0 m -> 5 m (from as good as zero)"),  # 500 times the floor, not the baseline
+        (0.2, 5.0, "0.200 m -> 5 m (25 times the baseline)"),
+        (0.005, 0.025, "0.005 m -> 0.025 m (200 % worse)"),  # of the floor, 0.01 m
+        (None, 5.0, "undefined -> 5 m"),
+    ],
+)
+def test_a_multiple_is_one_of_the_baseline(before, now, text: str) -> None:
+    item = compare_with(baseline_of(suite([ok("a", before)])), suite([ok("a", now)]))
+    (change,) = [c for c in item.changes if c.metric == MAX]
+    assert change_text(change) == f"a/default: {MAX} {text}"
 
 
 def test_what_did_not_run_comes_first_then_missed_bars_then_the_largest() -> None:

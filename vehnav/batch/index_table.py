@@ -170,7 +170,7 @@ def _change_cell(
         text = "figure new" if mine.before is None else "figure gone"
         return f'<td data-v="-">{text}</td>'
     red = ' class="red"' if regressed else ""
-    return f'<td data-v="{mine.worsening:.4g}"{red}>{esc(wording.moved(mine.worsening))}</td>'
+    return f'<td data-v="{mine.worsening:.4g}"{red}>{esc(wording.change_moved(mine))}</td>'
 
 
 def _remark(r: Result) -> str:

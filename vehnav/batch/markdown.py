@@ -235,7 +235,7 @@ def _changed(change: Change | None, *, new: bool) -> str:
         return "new" if new else ""
     if change.worsening is None:
         return "figure gone" if change.now is None else "figure new"
-    text = cell(wording.moved(change.worsening))
+    text = cell(wording.change_moved(change))
     return f"**{text}**" if change.failed else text
 
 

@@ -8,6 +8,7 @@ from typing import Final
 
 from vehnav.batch.model import MAIN_METRIC, BarResult, Result, Results
 from vehnav.batch.regression import Change, Comparison, Paired, Turned
+from vehnav.batch.worsening import floor_of
 
 UNITS: Final = (("_m_s", "m/s"), ("_deg", "deg"), ("percent", "%"), ("_m", "m"), ("_s", "s"))
 """By the end of a part of a metric's name."""
@@ -82,6 +83,15 @@ def moved(worsening: float) -> str:
     return f"{text} % {'worse' if worsening > 0.0 else 'better'}"
 
 
+def change_moved(change: Change) -> str:
+    """The change of a log's figure in words; of a baseline as good as zero there is no multiple."""
+    if change.worsening is None:
+        return ""
+    text = moved(change.worsening)
+    small = change.before is not None and abs(change.before) < floor_of(change.metric)
+    return "from as good as zero" if small and text.endswith(" times the baseline") else text
+
+
 # ---- sentences ---------------------------------------------------------------------------------
 
 
@@ -110,7 +120,7 @@ def state_text(result: Result) -> str:
 def change_text(change: Change) -> str:
     """A figure of a log before and now."""
     before, now = (with_unit(v, change.metric) for v in (change.before, change.now))
-    share = "" if change.worsening is None else f" ({moved(change.worsening)})"
+    share = "" if change.worsening is None else f" ({change_moved(change)})"
     return f"{change.log}/{change.config}: {change.metric} {before} -> {now}{share}"
 
 

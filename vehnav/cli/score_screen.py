@@ -147,7 +147,7 @@ def _remark(row: Result, change: Change | None) -> str:
     if row.damaged:
         texts.append("damaged log")
     if change is not None and change.worsening:
-        texts.append(wording.moved(change.worsening))
+        texts.append(wording.change_moved(change))
     return "; ".join(texts)
 
 
