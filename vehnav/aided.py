@@ -16,8 +16,17 @@ import numpy.typing as npt
 from vehnav.aiding.coarse import AT_ONCE, CoarseStart, coarse_start
 from vehnav.aiding.error_model import NAVIGATION
 from vehnav.aiding.fixes import Fixes
+from vehnav.aiding.gaps import bridge_gaps
 from vehnav.aiding.known import with_sensor
-from vehnav.aiding.land import LandResult, Tuning, Use, run_land, tuning_from_log, with_steady_gyro
+from vehnav.aiding.land import (
+    EPOCH,
+    LandResult,
+    Tuning,
+    Use,
+    run_land,
+    tuning_from_log,
+    with_steady_gyro,
+)
 from vehnav.aiding.lost import SECONDS
 from vehnav.aiding.vehicle import ODO_SCALE
 from vehnav.classic import Drive, Outcome
@@ -144,7 +153,11 @@ def run_aided(
         _alignment(drive, t_ns, start, given, fixes),
         _gps_use(fixes, until, cut, config),
         result,
-        tuple(vetoed + _findings(start, result, fixes, given)),
+        tuple(
+            _gap_findings(drive, t_ns, result, smoothed=config.method == "smooth")
+            + vetoed
+            + _findings(start, result, fixes, given)
+        ),
     )
 
 
@@ -317,6 +330,33 @@ def _findings(
         text = "no course of GPS shows the heading at the start: the frame is only local"
         findings.append(Finding("local-frame", "warning", text))
     return findings + _doubts(result)
+
+
+def _gap_findings(
+    drive: Drive, t_ns: npt.NDArray[np.int64], result: LandResult, *, smoothed: bool
+) -> list[Finding]:
+    """What bridges each long gap, what it leaves open, and the heading sigma for it.
+
+    The smoother's sigma does not grow over a gap: both of its sides tell.
+    """
+    t, coast = drive.t, np.flatnonzero(drive.increments.coast)
+    if not coast.size:
+        return []
+    _, left = bridge_gaps(drive.increments, drive.omega, drive.f)
+    first, sigma = result.outcome.first, result.outcome.sigma_heading
+    findings = []
+    for k in coast:
+        text = (
+            f"no IMU for {t[k + 1] - t[k]:.2f} s: bridged by a cubic through the rates at its "
+            "edges and by the mean of the forces there; this leaves "
+            f"{left.attitude[k, 2] / DEG:.1f} deg of heading open"
+        )
+        if not smoothed and sigma is not None and k >= first:
+            after = min(int(np.searchsorted(t, t[k + 1] + EPOCH)), t.size - 1)
+            grown = float(sigma[after - first] - sigma[k - first]) / DEG
+            text += f", and the heading sigma grew by {max(grown, 0.0):.1f} deg"
+        findings.append(Finding("gap", "warning", text, int(t_ns[k]), int(t_ns[k + 1])))
+    return findings
 
 
 def _doubts(result: LandResult) -> list[Finding]:

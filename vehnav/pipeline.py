@@ -307,15 +307,14 @@ def _samples(log: Log, config: Config) -> Samples:
         declared=Declared.of_degrees(
             config.axes, config.accel_axes, config.mount, config.accel_scale
         ),
-        max_gap=config.max_gap,
-        rule=stop_rule(config),
         gps=gps_between(
             None if config.gps == "none" else log.gnss,
             log.start_ns,
             without=outage_intervals(config, log.start_ns, int(imu.t_ns[-1])),
         ),
-        gps_seconds=config.gps_start_seconds,
-    )
+        max_gap=config.max_gap, rule=stop_rule(config),
+        gps_seconds=config.gps_start_seconds, coasts=not config.aided,
+    )  # fmt: skip
     return replace(samples, findings=(*stamps, *samples.findings))
 
 

@@ -117,6 +117,7 @@ def prepare_samples(
     rule: StopRule,
     gps: GpsBetween | None = None,
     gps_seconds: float = 60.0,
+    coasts: bool = True,
 ) -> Samples:
     """Turn the samples into the body in SI, integrate them over their steps, name the gaps.
 
@@ -140,6 +141,9 @@ def prepare_samples(
         Velocity by GPS between two instants, for the evidence; None: not to be used.
     gps_seconds : float
         s after the first departure that GPS may show before it is asked for more.
+    coasts : bool
+        Whether the method holds rate and speed over gaps longer than ``max_gap``; one that does
+        not says itself what it did there.
 
     Raises
     ------
@@ -148,7 +152,7 @@ def prepare_samples(
         show the true ones; or over 10 s of IMU are missing.
     """
     t: Array = np.asarray((imu.t_ns - start_ns) * NS, dtype=np.float64)
-    gaps = _gap_findings(imu.t_ns, t, path, max_gap)
+    gaps = _gap_findings(imu.t_ns, t, path, max_gap, coasts=coasts)
     imu, units, findings = in_si(imu, t, path=path, gps=gps)
     if declared.accel_scale != 1.0:
         imu = replace(imu, accel=imu.accel * declared.accel_scale)
@@ -213,9 +217,9 @@ def split_log(log: Log) -> list[Log]:
 
 
 def _gap_findings(
-    t_ns: npt.NDArray[np.int64], t: Array, path: str, max_gap: float
+    t_ns: npt.NDArray[np.int64], t: Array, path: str, max_gap: float, *, coasts: bool
 ) -> list[Finding]:
-    """One finding per long gap, one for all the short ones."""
+    """One finding per long gap where the method coasts, one for all the short ones."""
     hopeless = hopeless_gaps(t_ns)
     if hopeless.size:
         k = int(hopeless[0])
@@ -241,13 +245,13 @@ def _gap_findings(
                 int(t_ns[short[-1] + 1]),
             )
         )
-    for k in long:
+    for k in long if coasts else ():
         findings.append(
             Finding(
                 "gap",
                 "warning",
-                f"no IMU for {dt[k]:.2f} s; attitude rate and speed were held (--max-gap "
-                f"{max_gap:g} s)",
+                f"no IMU for {dt[k]:.2f} s, over --max-gap {max_gap:g} s: attitude rate and speed "
+                "are held",
                 int(t_ns[k]),
                 int(t_ns[k + 1]),
             )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -146,3 +147,41 @@ def test_rates_at_the_edges_do_not_fill_a_long_gap(start):
     error, ratio = errors(made, run(replace(log, imu=cut), Config(method="filter")))
     assert error.max() < 150.0
     assert np.percentile(ratio, 95) < 5.0
+
+
+def without_imu(log, start, length):
+    t = (log.imu.t_ns - log.start_ns) * 1e-9
+    kept = (t < start) | (t > start + length)
+    imu = replace(
+        log.imu, t_ns=log.imu.t_ns[kept], gyro=log.imu.gyro[kept], accel=log.imu.accel[kept]
+    )
+    return replace(log, imu=imu)
+
+
+def test_a_gap_says_by_how_much_the_heading_sigma_grew():
+    """By the sigmas beside the gap, of a run with it and of one of the whole log."""
+    log = drive().log()
+    whole = run(log, Config(method="filter")).trajectory
+    cut = run(without_imu(log, 70.0, 4.0), Config(method="filter"))
+    (gap,) = [f for f in cut.findings if f.code == "gap"]
+    assert gap.level == "warning"
+    assert "held" not in gap.text
+    said = float(re.search(r"heading sigma grew by ([\d.]+) deg", gap.text)[1])
+    after = gap.end_ns + 200_000_000
+    with_gap, without = (
+        np.degrees(x.sigma_heading[np.searchsorted(x.t_ns, after)]) for x in (cut.trajectory, whole)
+    )
+    assert with_gap - without > 0.5
+    assert said == pytest.approx(with_gap - without, rel=0.2)
+
+
+def test_the_smoother_says_what_a_gap_leaves_open_and_the_stops_that_they_coast():
+    log = without_imu(drive().log(), 70.0, 4.0)
+    texts = {
+        method: [f.text for f in run(log, Config(method=method)).findings if f.code == "gap"]
+        for method in ("smooth", "stops")
+    }
+    assert [len(found) for found in texts.values()] == [1, 1]
+    assert "of heading open" in texts["smooth"][0]
+    assert "grew" not in texts["smooth"][0]
+    assert "speed are held" in texts["stops"][0]
