@@ -125,7 +125,7 @@ def test_a_baseline_counts_the_runs_that_failed_and_needs_one_that_did_not(suite
     (tmp_path / "drive.mcap").write_bytes(b"nothing")
     none = vehnav(path, "-o", tmp_path / "out", "--update-baseline")
     assert none.exit_code == 2
-    assert "baseline.json: not written, none of the 2 runs has a result" in none.stderr
+    assert "baseline.json: not written, all 2 runs failed" in none.stderr
     assert not base.exists()
 
 

@@ -101,7 +101,8 @@ def write_baseline(results: Results, path: str | Path) -> None:
         )
     if not any(r.status == "ok" for r in results.results):
         count = len(results.results)
-        why = f"none of the {count} runs has a result" if count else "the suite has no logs here"
+        failed = "the only run failed" if count == 1 else f"all {count} runs failed"
+        why = failed if count else "the suite has no logs here"
         raise ConfigError(f"{path}: not written, {why}: a baseline without figures gates nothing")
     item = baseline_of(results)
     rows = [
