@@ -45,9 +45,9 @@ class Config:
         Name of the catalogue or TOML file: its noise weighs the stops beside the log's own rest
         and is that of the filter; its stop threshold counts where none is given.
     sensor_grade : {"auto", "mems", "tactical"}
-        Noise of the filter; ``auto``: by the gyro at rest.
+        Noise of the filter, which alone has it; ``auto``: by the gyro at rest.
     azimuth : {"relative", "absolute"}
-        Law of the wander axes.
+        Law of the wander axes, which the filter, ``frame="wander"`` and ``coords="quasi"`` have.
     as_published : bool
         The two procedures of paper 002 alone.
     levelling, reset : bool
@@ -59,7 +59,7 @@ class Config:
     coords : {"auto", "normal", "quasi"}
         Whether quasi-coordinates are written too; ``auto``: in wander axes beyond 85 degrees.
     vertical : {"clamp", "free"}
-        Of the stop methods; the filter always estimates the height.
+        Of the stop methods; the filter always estimates the height and refuses ``free``.
     ellipsoid : {"wgs84", "krasovsky"}
     levelling_rate : float or None
         k g, 1/s; None: 1 / (t + 0.5 s), the running mean since levelling started.
@@ -148,6 +148,20 @@ class Config:
                 raise ConfigError(
                     f"{option} belongs to --method stops; the filter levels and resets by itself"
                 )
+        if self.aided and self.vertical == "free":
+            raise ConfigError(
+                "--vertical free belongs to --method stops or free; the filter always integrates "
+                "the height and its error is a state"
+            )
+        for option, given in self._of_the_filter().items():
+            if not self.aided and given:
+                raise ConfigError(f"{option} belongs to --method filter or smooth")
+        carried = self.free_azimuth or self.coords == "quasi"
+        if self.azimuth == "absolute" and not carried:
+            raise ConfigError(
+                "--azimuth absolute is a law of wander axes: add --frame wander, --coords quasi or "
+                "--method filter"
+            )
         for text in self.outage:
             outage_spans(text, 0.0)
         if self.outage and self.gps != "aid":
@@ -161,6 +175,13 @@ class Config:
             "--no-reset": not self.reset,
             "--levelling-rate": self.levelling_rate is not None,
             "--frame eci": self.frame == "eci",
+        }
+
+    def _of_the_filter(self) -> dict[str, bool]:
+        """Options that mean nothing to the stop methods, and whether they were given."""
+        return {
+            f"--sensor-grade {self.sensor_grade}": self.sensor_grade != "auto",
+            f"--gnss-form {self.gnss_form}": self.gnss_form != "direct",
         }
 
     @cached_property

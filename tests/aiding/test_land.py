@@ -159,6 +159,30 @@ def test_options_of_the_stops_are_refused(wrong):
     Config(method="stops", **wrong)
 
 
+@pytest.mark.parametrize(
+    "wrong", [{"sensor_grade": "mems"}, {"sensor_grade": "tactical"}, {"gnss_form": "quasi"}]
+)
+def test_options_of_the_filter_are_refused(wrong):
+    for method in ("stops", "free"):
+        with pytest.raises(ConfigError, match="belongs to --method filter or smooth"):
+            Config(method=method, **wrong)
+    Config(method="filter", **wrong)
+
+
+def test_a_free_height_is_refused_where_the_height_is_a_state():
+    for method in ("filter", "smooth"):
+        with pytest.raises(ConfigError, match="--vertical free"):
+            Config(method=method, vertical="free")
+    Config(vertical="free")
+
+
+def test_a_law_of_the_azimuth_wants_wander_axes():
+    with pytest.raises(ConfigError, match="--frame wander"):
+        Config(azimuth="absolute")
+    for there in ({"frame": "wander"}, {"coords": "quasi"}, {"method": "filter"}):
+        Config(azimuth="absolute", **there)
+
+
 def test_speed_and_constraint_see_no_attitude():  # T28
     h, par = np.zeros(SIZE), np.zeros(SIZE - 9)
     c_wb, v = mat3(c_nb_from_angles(0.3, 0.02, -0.01)), (10.0, 4.0, 0.2)

@@ -113,7 +113,9 @@ RUN_FIELDS = (
 )  # fmt: skip
 @option(
     "method", "--azimuth", type=click.Choice(["relative", "absolute"]), default="relative",
-    show_default=True, help="Wander axes free relative to the Earth or to inertial space.",
+    show_default=True,
+    help="Wander axes (filter, --frame wander, --coords quasi) free relative to the Earth or to "
+    "inertial space.",
 )  # fmt: skip
 @option(
     "method", "--as-published", is_flag=True, default=False,
@@ -145,7 +147,9 @@ RUN_FIELDS = (
 )  # fmt: skip
 @option(
     "method", "--vertical", type=click.Choice(["clamp", "free"]), default="clamp",
-    show_default=True, help="Hold the height, or integrate it.",
+    show_default=True,
+    help="Stop methods: hold the height, or integrate it. The filter always estimates it and "
+    "refuses free.",
 )  # fmt: skip
 @option(
     "method", "--ellipsoid", type=click.Choice(["wgs84", "krasovsky"]), default="wgs84",
