@@ -31,7 +31,11 @@ def ecef_of(place: Mat3, h: float, earth: Ellipsoid) -> Vec3:
 
 @kernel
 def zero_velocity(h: Array, j: int, v: Vec3) -> float:
-    """Axis j of the velocity is zero: z = V' (003, as 37)."""
+    """Axis j of the velocity is zero: z = V' (003, as 37).
+
+    At a stop the velocity that a tilt makes, g times it in a second, brings the tilt out: levelling
+    and reset of paper 002 are this measurement with a gain that is chosen.
+    """
     h[:] = 0.0
     h[3 + j] = 1.0
     return v[j]
