@@ -108,44 +108,42 @@ def test_outages_of_60_s(logs, name, most):
     assert np.median(worst) <= most
 
 
-REFERENCE = {"boston": 1.0, "0708": 0.01}
-"""m: sigma of the GPS that judges (a puck; a phase solution); it is part of the error seen."""
+REFERENCE = {"boston": 1.0, "0708": 0.01, "0042": 0.4, "0018": 0.4}
+"""m: sigma of the GPS that judges (a puck; a phase solution; one that states nothing); it is part
+of the error seen."""
+STRETCHES = {"boston": (100, 700, 60, 60), "0708": (100, 530, 60, 60), "0042": (40, 118, 20, 47),
+             "0018": (60, 280, 20, 60)}  # fmt: skip
+"""s: GPS ends from here to there, every so often, for so long or for good."""
 
 
-def inside(log, axes, reference, method, cuts):
-    """Shares of errors inside 1, 2, 3 sigma in cut stretches, every 2 s."""
-    ratios = []
-    for cut in cuts:
-        found = run(log, Config(method=method, axes=axes, gps="aid", outage=(cut,)))
-        t, errors = (log.gnss.t_ns - log.start_ns) * 1e-9, found.errors
-        first, last = (float(x) for x in cut.split(":"))
-        judged = (errors.t_ns - log.start_ns) * 1e-9
-        use = (judged > first) & (judged < min(last, t[-1]))
-        kept = np.flatnonzero(use)
-        kept = kept[np.diff(np.floor(judged[kept] / 2.0), prepend=-1.0) > 0]
-        s = [np.interp(errors.t_ns[kept], found.trajectory.t_ns, found.trajectory.sigma_pos[:, k])
-             for k in range(2)]  # fmt: skip
-        sigma = np.sqrt(0.5 * (s[0] ** 2 + s[1] ** 2) + reference**2)
-        ratios.append(errors.horizontal[kept] / sigma)
-    ratio = np.concatenate(ratios)
-    return [float(np.mean(ratio < k)) for k in (1.0, 2.0, 3.0)]
+def ratios(log, config, reference, first, last):
+    """Horizontal errors over their sigmas in a cut stretch, every 2 s."""
+    found = run(log, replace(config, outage=(f"{first}:{last}",)))
+    t, errors = (log.gnss.t_ns - log.start_ns) * 1e-9, found.errors
+    judged = (errors.t_ns - log.start_ns) * 1e-9
+    kept = np.flatnonzero((judged > first) & (judged < min(last, t[-1])))
+    kept = kept[np.diff(np.floor(judged[kept] / 2.0), prepend=-1.0) > 0]
+    s = [np.interp(errors.t_ns[kept], found.trajectory.t_ns, found.trajectory.sigma_pos[:, k])
+         for k in range(2)]  # fmt: skip
+    return errors.horizontal[kept] / np.sqrt(0.5 * (s[0] ** 2 + s[1] ** 2) + reference**2)
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("grade", ["mems", "tactical"])
 @pytest.mark.parametrize("method", ["filter", "smooth"])
-def test_share_of_real_errors_inside_the_circles(logs, method):
-    """Two drives, GPS that ends every minute: within 10 points of what Rayleigh's law wants.
+def test_share_of_real_errors_inside_the_circles(logs, method, grade):
+    """Two drives of a grade, GPS that ends at many times: within 10 points of Rayleigh's law.
 
     The errors of one drive hang together over minutes, so a single stretch may be far off to
     either side.
     """
-    shares = []
-    for name, reference in REFERENCE.items():
+    found = []
+    for name in ("boston", "0708") if grade == "mems" else ("0042", "0018"):
         log, axes = logs[name]
-        end = 700 if name == "boston" else 530
-        for cuts in (
-            [f"{a}:{a + 60}" for a in range(100, end - 60, 60)],
-            [f"{a}:{end + 100}" for a in range(100, end - 60, 60)],
-        ):
-            shares.append(inside(log, axes, reference, method, cuts))
-    assert np.mean(shares, axis=0) == pytest.approx([0.39, 0.86, 0.99], abs=0.10)
+        config = Config(method=method, axes=axes, gps="aid", sensor_grade=grade)
+        start, end, every, length = STRETCHES[name]
+        for a in range(start, end - length + 1, every):
+            found += [ratios(log, config, REFERENCE[name], a, b) for b in (a + length, end + 100)]
+    ratio = np.concatenate(found)
+    shares = [float(np.mean(ratio < k)) for k in (1.0, 2.0, 3.0)]
+    assert shares == pytest.approx([0.39, 0.86, 0.99], abs=0.10)
