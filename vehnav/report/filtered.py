@@ -6,14 +6,13 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from vehnav.aiding import vehicle
+from vehnav.aiding.error_model import NAVIGATION
 from vehnav.aiding.fix_noise import FLOOR
 from vehnav.aiding.land import LandResult
 from vehnav.pipeline import Run
 from vehnav.report.markup import esc, table
 from vehnav.units import DEG, DEG_PER_HOUR
 
-NAVIGATION: Final = 9
-"""States before the parameters."""
 PERCENT: Final = 0.01
 
 
