@@ -15,7 +15,7 @@ from click.testing import CliRunner, Result
 
 from tests.logs_for_tests import straight_log
 from vehnav.cli.main import cli
-from vehnav.report.document import schema
+from vehnav.report.schema import schema
 
 HEADER = (
     "time_s lat_deg lon_deg height_m v_east_m_s v_north_m_s v_up_m_s heading_deg pitch_deg "

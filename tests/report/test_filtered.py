@@ -10,9 +10,10 @@ import pytest
 
 from vehnav.config import Config
 from vehnav.pipeline import run
-from vehnav.report.document import document, schema
+from vehnav.report.document import document
 from vehnav.report.filtered import filter_lines, filter_tree
 from vehnav.report.html import render_html
+from vehnav.report.schema import schema
 from vehnav.rotation import c_nb_from_angles
 from vehnav.simulate import GnssModel, WheelModel, simulate
 

@@ -10,8 +10,8 @@ import pytest
 
 from vehnav.config import Config
 from vehnav.report.causes import causes_block, causes_lines, causes_of
-from vehnav.report.document import schema
 from vehnav.report.html import render_html
+from vehnav.report.schema import schema
 from vehnav.report.summary import summary
 
 

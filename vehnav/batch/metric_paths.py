@@ -2,23 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
-from functools import cache
-from importlib import resources
 from typing import Any
 
 from vehnav.batch.fields import nearest
 from vehnav.batch.finding_codes import CODES
 from vehnav.errors import ConfigError
-
-
-@cache
-def _schema() -> dict[str, Any]:
-    """The file itself: :mod:`vehnav.report.document` loads all that a run needs."""
-    text = resources.files("vehnav.report").joinpath("report.schema.json").read_text("utf-8")
-    loaded: dict[str, Any] = json.loads(text)
-    return loaded
+from vehnav.report.schema import schema
 
 
 def check_metric(metric: str, where: str) -> None:
@@ -40,7 +30,7 @@ def check_metric(metric: str, where: str) -> None:
             raise ConfigError(f"{where}: no finding has the code {code!r}{nearest(code, CODES)}")
         return
     steps = metric.split(".")
-    node = _schema()
+    node = schema()
     for step in steps:
         named = node.get("properties", {})
         others = node.get("additionalProperties", True)
@@ -54,7 +44,7 @@ def _resolved(node: Any) -> dict[str, Any]:
     if not isinstance(node, Mapping):
         return {}
     if "$ref" in node:
-        return _resolved(_schema()["$defs"][node["$ref"].rpartition("/")[2]])
+        return _resolved(schema()["$defs"][node["$ref"].rpartition("/")[2]])
     for choice in node.get("anyOf", ()):
         if choice.get("type") != "null":
             return _resolved(choice)
